@@ -1,0 +1,93 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+#
+# make demo, make test and the rest do all their set-up: see `make help`.
+
+PYTHON ?= python3
+CONSTRAINTS ?=
+DEMO_ARGS ?=
+PYTEST_ARGS ?=
+
+# The wheels of ROS 2 set this variable, and with it the library path, for one environment only.
+ifdef _ROS_WHEELS_BOOTSTRAP_COMPLETE
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH
+endif
+
+# ROS 2 Jazzy where it is sourced, else its wheels, which must not see another ROS.
+ROS := $(if $(filter jazzy,$(ROS_DISTRO)),$(shell \
+	env -u _ROS_WHEELS_BOOTSTRAP_COMPLETE $(PYTHON) -c 'import rclpy; print("sourced")' 2>/dev/null))
+ifeq ($(ROS),sourced)
+EXTRAS := test,bags
+else
+EXTRAS := test,bags,ros
+unexport PYTHONPATH AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH
+endif
+
+# Another interpreter or constraints file has an environment and a workspace of its own.
+ifeq ($(PYTHON)$(CONSTRAINTS),python3)
+VENV := .venv
+WORKSPACE := .
+else
+NAME := $(subst $() ,,$(notdir $(PYTHON))$(if $(CONSTRAINTS),-$(basename $(notdir $(CONSTRAINTS)))))
+VENV := .venv-$(NAME)
+WORKSPACE := .workspace-$(NAME)
+endif
+
+PREFIX := $(WORKSPACE)/install/hysteresis_ros
+SOURCES := $(shell find hysteresis_ros config launch resource -type f \
+	-not -path '*/__pycache__/*' 2>/dev/null | LC_ALL=C sort) package.xml setup.py setup.cfg
+
+# colcon on the environment's own interpreter, which becomes that of the executables.
+COLCON := $(VENV)/bin/python -c 'import sys; from colcon_core.command import main; sys.exit(main())'
+
+# Runs a command in the built workspace. ROS 2 from wheels does not name its own prefix.
+IN_WORKSPACE := export PATH="$(abspath $(VENV))/bin:$$PATH"; \
+	$(if $(filter sourced,$(ROS)),,export AMENT_PREFIX_PATH="$(abspath $(VENV))";) \
+	. $(abspath $(WORKSPACE))/install/local_setup.sh; \
+	HYSTERESIS_ROS_PREFIX="$(abspath $(PREFIX))" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+.PHONY: help build demo test benchmark hidden clean force
+
+help:
+	@echo 'make demo       the whole system on the simulated arm: identify, drive, record, compare'
+	@echo 'make test       all tests and linters'
+	@echo 'make benchmark  speed and accuracy, into benchmark.json'
+	@echo 'make hidden     the hidden-effect grid, into hidden.json'
+	@echo 'make build      the workspace alone; then: . install/local_setup.sh'
+	@echo 'make clean      remove all that make made'
+	@echo 'PYTHON= chooses the interpreter, CONSTRAINTS= a pip constraints file,'
+	@echo 'DEMO_ARGS= the options of `hysteresis demo`, PYTEST_ARGS= those of pytest.'
+
+$(VENV)/made: setup.py tools/environment.sh tools/requirements.py $(wildcard $(CONSTRAINTS))
+	@tools/environment.sh "$(PYTHON)" $(VENV) $(EXTRAS) $(CONSTRAINTS)
+	@touch $@
+
+# Changes when a source appears or goes, which no file's time shows.
+$(WORKSPACE)/build/sources: force
+	@mkdir -p $(@D)
+	@echo '$(SOURCES)' | cmp -s - $@ || echo '$(SOURCES)' > $@
+
+$(WORKSPACE)/build/made: $(VENV)/made $(SOURCES) $(WORKSPACE)/build/sources
+	@rm -rf $(WORKSPACE)/build/hysteresis_ros $(PREFIX)
+	@$(COLCON) --log-base $(WORKSPACE)/log build --base-paths . \
+		--build-base $(WORKSPACE)/build --install-base $(WORKSPACE)/install
+	@touch $@
+
+build: $(WORKSPACE)/build/made
+
+demo: build
+	@$(IN_WORKSPACE) $(PREFIX)/lib/hysteresis_ros/hysteresis demo $(DEMO_ARGS)
+
+test: build
+	@$(IN_WORKSPACE) $(VENV)/bin/python -m pytest --cov --cov-report=term $(PYTEST_ARGS)
+
+benchmark: build
+	@$(IN_WORKSPACE) $(VENV)/bin/python -m benchmark benchmark.json
+
+hidden: build
+	@$(IN_WORKSPACE) $(VENV)/bin/python tools/hidden.py hidden.json
+
+clean:
+	rm -rf .venv* .workspace* build install log dist demo *.egg-info
+	rm -rf .pytest_cache .hypothesis .coverage benchmark.json hidden.json
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,106 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Build description of the package, for colcon and for pip."""
+
+from glob import glob
+import os
+import re
+
+from setuptools import find_packages, setup
+
+from distutils.command.install_data import install_data  # from setuptools: not before its import
+
+PACKAGE = 'hysteresis_ros'
+
+EXECUTABLES = {
+    'geometry_node': 'hysteresis_ros.nodes.geometry_node:main',
+    'compensator_node': 'hysteresis_ros.nodes.compensator_node:main',
+    'bridge_node': 'hysteresis_ros.nodes.bridge_node:main',
+    'monitor_node': 'hysteresis_ros.nodes.monitor_node:main',
+    'hysteresis': 'hysteresis_ros.cli.main:main',
+}
+
+LAUNCHER = """#!/bin/sh
+exec "$(dirname "$(readlink -f "$0")")/../../bin/{name}" "$@"
+"""
+
+
+class InstallData(install_data):
+    """
+    Data files, and in a wheel what `ros2 run` needs.
+
+    pip puts executables into bin/ whatever setup.cfg says, while `ros2 run` looks in
+    lib/hysteresis_ros/. So a wheel carries small launchers for that folder. colcon follows
+    setup.cfg and needs none.
+    """
+
+    def run(self):
+        """Install the files, then the launchers."""
+        super().run()
+        if 'bdist_wheel' not in self.distribution.commands:
+            return
+        folder = os.path.join(self.install_dir, 'lib', PACKAGE)
+        self.mkpath(folder)
+        for name in EXECUTABLES:
+            path = os.path.join(folder, name)
+            with open(path, 'w', encoding='utf-8') as launcher:
+                launcher.write(LAUNCHER.format(name=name))
+            os.chmod(path, 0o755)
+            self.outfiles.append(path)
+
+
+def version():
+    """Return the version that package.xml gives, so that there is one place for it."""
+    with open('package.xml', encoding='utf-8') as manifest:
+        return re.search('<version>(.+)</version>', manifest.read()).group(1)
+
+
+setup(
+    name=PACKAGE,
+    version=version(),
+    description='Hysteresis models that drive artificial muscles and find the physics they lack',
+    author='hysteresis_ros contributors',
+    maintainer='hysteresis_ros contributors',
+    maintainer_email='maintainers@hysteresis-ros.example',
+    license='Apache-2.0',
+    keywords=['ROS', 'hysteresis', 'Preisach', 'artificial muscle', 'shape memory alloy'],
+    packages=find_packages(include=[PACKAGE, PACKAGE + '.*']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + PACKAGE]),
+        ('share/' + PACKAGE, ['package.xml']),
+        ('share/' + PACKAGE + '/config', sorted(glob('config/*.yaml'))),
+        ('share/' + PACKAGE + '/launch', sorted(glob('launch/*.py'))),
+    ],
+    entry_points={
+        'console_scripts': [f'{name} = {target}' for name, target in EXECUTABLES.items()],
+    },
+    python_requires='>=3.10',
+    install_requires=[
+        'numpy>=1.26',
+        'scipy>=1.11',
+        'matplotlib>=3.6',
+        'pyserial>=3.5',
+        'PyYAML>=6.0.1',
+        'joblib>=1.3',
+        'tqdm>=4.64',
+    ],
+    extras_require={
+        # Reads and writes rosbag2 folders where rosbag2_py is not installed.
+        'bags': ['rosbags>=0.10'],
+        # Spreads a diagnosis over a laboratory's machines.
+        'cluster': ['dask[distributed]>=2024.1'],
+        # ROS 2 Jazzy as wheels, for a machine that has no ROS.
+        'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
+        'test': [
+            # launch_testing's plug-in, which ROS installs, breaks with pytest 9.
+            'pytest>=7.4,<9',
+            'pytest-cov',
+            'hypothesis',
+            'flake8',
+            'flake8-quotes',
+            'pydocstyle',
+        ],
+    },
+    cmdclass={'install_data': InstallData},
+    zip_safe=True,
+)

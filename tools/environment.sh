@@ -1,0 +1,50 @@
+#!/bin/sh
+# Makes a virtual environment, or brings one up to date, with all that the package needs.
+#
+#   tools/environment.sh PYTHON FOLDER EXTRAS [CONSTRAINTS]
+#
+# EXTRAS are extras of setup.py, comma-separated. With `ros` among them, ROS 2 comes as wheels;
+# without, the environment sees the machine's own packages, ROS 2 among them.
+set -eu
+python=$1 folder=$2 extras=$3 constraints=${4:-}
+
+"$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' || {
+    echo "$python does not run or is older than Python 3.10: name another one with PYTHON=" >&2
+    exit 1
+}
+if [ -n "$constraints" ] && [ ! -r "$constraints" ]; then
+    echo "$constraints cannot be read: name a pip constraints file with CONSTRAINTS=" >&2
+    exit 1
+fi
+
+case ,$extras, in
+    *,ros,*) sight='' ;;
+    *) sight=--system-site-packages ;;
+esac
+
+# An environment holds absolute paths, so a moved checkout needs a new one, as another Python does.
+identity="$PWD $python $("$python" -c 'import sys; print(sys.version)') $extras $constraints"
+if [ "$(cat "$folder/identity" 2>/dev/null)" != "$identity" ]; then
+    echo "Making $folder: a minute or two, once."
+    rm -rf "$folder"
+    if ! "$python" -m venv $sight "$folder" >/dev/null 2>&1; then
+        # Debian and Ubuntu keep ensurepip in python3-venv; the pip that is there does as well.
+        rm -rf "$folder"
+        "$python" -m venv $sight --without-pip "$folder"
+        "$python" -m pip install -qq --target "$("$folder/bin/python" -c \
+            'import sysconfig; print(sysconfig.get_path("purelib"))')" pip
+    fi
+    touch "$folder/COLCON_IGNORE"
+    printf '%s\n' "$identity" > "$folder/identity"
+fi
+
+install() {
+    "$folder/bin/python" -m pip install -qq --disable-pip-version-check \
+        ${constraints:+--constraint "$constraints"} "$@"
+}
+# colcon still calls `setup.py install`, which setuptools 80 gave up; colcon-core bounds it, too.
+install 'setuptools<80'
+# The words are requirements, none of which holds a space.
+# shellcheck disable=SC2046
+install colcon-core colcon-ros colcon-bash colcon-zsh \
+    $("$folder/bin/python" tools/requirements.py "$extras")
