@@ -1,0 +1,243 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The Preisach plane cut into cells, and the weight above any of its points.
+
+The weight function is constant in each cell of a triangular grid (below Eq. 5). Cell (i, j) of
+Eqs. 6 and 8 is the i-th interval of beta from below and the j-th interval of alpha counted from
+the diagonal: beta in [x_(i-1), x_i], alpha in [x_(i+j-2), x_(i+j-1)]; j = 1 are the triangles on
+the diagonal. The Everett function E(alpha, beta) is the weight over the triangle
+{beta <= b <= a <= alpha}; in a cell it is
+
+    E = E(x_a, x_(b+1)) + A p + C q + w p q + (w_a p^2 + w_b q^2) / 2
+
+with p = alpha - x_a, q = x_(b+1) - beta, the weights w, w_a, w_b of the cell and of the two
+diagonal cells beside it, and A, C the weight along the row and along the column up to the cell.
+In a diagonal cell it is w (alpha - beta)^2 / 2. All terms are non-negative: nothing cancels.
+"""
+
+from bisect import bisect_right
+import math
+
+import numpy as np
+
+from ..errors import ParameterError
+from .base import numbers
+
+# Values beyond are refused, so that no product inside can overflow.
+LARGEST = 1e100
+# Nodes closer than this share of the range are taken for a mistake.
+CLOSEST = 1e-12
+
+
+def check_nodes(nodes: np.ndarray) -> np.ndarray:
+    """
+    Return grid nodes as a checked array.
+
+    Parameters
+    ----------
+    nodes : array_like, shape (N + 1,)
+        Strictly increasing inputs at which the weight may jump; they need not be equidistant.
+
+    Raises
+    ------
+    ParameterError
+        If there are fewer than two, or they are not finite or not strictly increasing.
+
+    """
+    array = numbers(nodes, 'Preisach nodes')
+    if len(array) < 2:
+        raise ParameterError(f'Preisach nodes: {len(array)} given, at least 2 are needed')
+    if np.max(np.abs(array)) > LARGEST:
+        raise ParameterError(f'Preisach nodes: beyond {LARGEST:g}, use another unit')
+    gaps = np.diff(array)
+    if not np.all(gaps > CLOSEST * (array[-1] - array[0])):
+        raise ParameterError(
+            f'Preisach nodes: entry {int(np.argmin(gaps)) + 1} ({array[np.argmin(gaps) + 1]!r}) '
+            'is not above the one before it')
+    return array
+
+
+def cells(levels: int) -> tuple[np.ndarray, np.ndarray]:
+    """
+    Return the intervals of beta and alpha of each cell, in the order of Eq. 8.
+
+    Parameters
+    ----------
+    levels : int
+        Number N of intervals of the grid.
+
+    Returns
+    -------
+    beta, alpha : ndarray of int, shape (N (N + 1) / 2,)
+        Index of the interval from below, from 0; alpha >= beta, equal on the diagonal.
+
+    """
+    beta, alpha = np.triu_indices(levels)
+    return beta, alpha
+
+
+def cell_areas(nodes: np.ndarray) -> np.ndarray:
+    """Return the area of each cell, shape (N (N + 1) / 2,), in the order of Eq. 8."""
+    width = np.diff(nodes)
+    beta, alpha = cells(len(width))
+    return width[beta] * width[alpha] * np.where(beta == alpha, 0.5, 1.0)
+
+
+class Everett:
+    """
+    The Everett function of a piecewise constant weight.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (N + 1,)
+        Checked grid nodes.
+    weights : ndarray, shape (N (N + 1) / 2,)
+        Non-negative weights in the order of Eq. 8.
+
+    Attributes
+    ----------
+    total : float
+        E over the whole plane.
+
+    """
+
+    def __init__(self, nodes: np.ndarray, weights: np.ndarray) -> None:
+        levels = len(nodes) - 1
+        width = np.diff(nodes)
+        beta, alpha = cells(levels)
+        density = np.zeros((levels, levels))
+        density[beta, alpha] = weights
+        mass = np.zeros((levels, levels))
+        mass[beta, alpha] = weights * cell_areas(nodes)
+
+        # corner[b, a] = E(x_a, x_b); row[b, a]: weight of alpha's interval a from x_b to x_a;
+        # column[b, a]: weight of beta's interval b from x_(b+1) to x_a.
+        corner = np.zeros((levels + 1, levels + 1))
+        corner[:levels, 1:] = np.cumsum(np.cumsum(mass[::-1], axis=0)[::-1], axis=1)
+        row = np.zeros((levels + 1, levels))
+        column = np.zeros((levels, levels + 1))
+        across = np.triu(density * width[:, None], 1)
+        row[:levels] = np.cumsum(across[::-1], axis=0)[::-1]
+        column[:, 1:] = np.cumsum(np.triu(density * width[None, :], 1), axis=1)
+        half = np.diag(density) / 2.0
+
+        self.total = float(corner[0, levels])
+        self.nodes = nodes
+        self._arrays = corner, row, column, density, half
+        # The scalar path reads plain floats from lists: about ten times faster than arrays.
+        self._levels = levels
+        self._list = nodes.tolist()
+        self._inner = self._list[1:-1]
+        self._half = half.tolist()
+        self._corner = corner.tolist()
+        self._corner_columns = corner.T.tolist()
+        self._row_columns = row.T.tolist()
+        self._column = column.tolist()
+        self._cells = [
+            [(self._list[a], self._list[b + 1], corner[b + 1, a].item(), row[b + 1, a].item(),
+              column[b, a].item(), density[b, a].item(), self._half[a], self._half[b])
+             for b in range(a)] for a in range(levels)]
+
+    def at(self, alpha: float, beta: float) -> float:
+        """Return E at one point, nodes[0] <= beta <= alpha <= nodes[-1]."""
+        a = bisect_right(self._inner, alpha)
+        b = bisect_right(self._inner, beta)
+        if a == b:
+            d = alpha - beta
+            return self._half[a] * d * d
+        x_a, x_b, corner, row, column, cross, half_a, half_b = self._cells[a][b]
+        p = alpha - x_a
+        q = x_b - beta
+        return corner + p * (row + cross * q + half_a * p) + q * (column + half_b * q)
+
+    def value(self, alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:
+        """Return E at points given as arrays that broadcast."""
+        corner, row, column, density, half = self._arrays
+        a, b = self.cell(alpha), self.cell(beta)
+        p = alpha - self.nodes[a]
+        q = self.nodes[b + 1] - beta
+        square = (corner[b + 1, a] + p * (row[b + 1, a] + density[b, a] * q + half[a] * p)
+                  + q * (column[b, a] + half[b] * q))
+        return np.where(a == b, half[a] * np.square(alpha - beta), square)
+
+    def rise(self, alpha: np.ndarray, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return dE/dalpha at points, and half of the second derivative, just above alpha."""
+        _, row, _, density, half = self._arrays
+        a, b = self.cell(alpha), self.cell(beta)
+        square = (row[b + 1, a] + density[b, a] * (self.nodes[b + 1] - beta)
+                  + 2.0 * half[a] * (alpha - self.nodes[a]))
+        return np.where(a == b, 2.0 * half[a] * (alpha - beta), square), half[a]
+
+    def fall(self, alpha: np.ndarray, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return -dE/dbeta at points, and half of the second derivative, just above beta."""
+        _, _, column, density, half = self._arrays
+        a, b = self.cell(alpha), self.cell(beta)
+        square = (column[b, a] + density[b, a] * (alpha - self.nodes[a])
+                  + 2.0 * half[b] * (self.nodes[b + 1] - beta))
+        return np.where(a == b, 2.0 * half[b] * (alpha - beta), square), half[b]
+
+    def cell(self, u: np.ndarray) -> np.ndarray:
+        """Return the interval that inputs lie in; a node belongs to the one above it."""
+        return np.searchsorted(self.nodes[1:-1], u, side='right')
+
+    def alpha(self, target: float, beta: float, tolerance: float) -> float:
+        """Return the smallest alpha with E(alpha, beta) = target, to within the tolerance."""
+        nodes = self._list
+        b = bisect_right(self._inner, beta)
+        q = nodes[b + 1] - beta
+        first = self._half[b] * q * q
+        if target <= tolerance:
+            return beta
+        if target - tolerance <= first:
+            return beta + _root(target, 0.0, self._half[b], q)
+        corners, columns = self._corner[b + 1], self._column[b]
+        low, high = b + 1, self._levels
+        if low == high:
+            return nodes[high]
+        sought = target - tolerance - first
+        while high - low > 1:
+            middle = (low + high) // 2
+            if corners[middle] + columns[middle] * q < sought:
+                low = middle
+            else:
+                high = middle
+        x, _, corner, row, column, cross, half, _ = self._cells[low][b]
+        rest = target - first - corner - column * q
+        return x + _root(rest, row + cross * q, half, nodes[low + 1] - x)
+
+    def beta(self, target: float, alpha: float, tolerance: float) -> float:
+        """Return the largest beta with E(alpha, beta) = target, to within the tolerance."""
+        nodes = self._list
+        a = bisect_right(self._inner, alpha)
+        p = alpha - nodes[a]
+        first = self._half[a] * p * p
+        if target <= tolerance:
+            return alpha
+        if target - tolerance <= first:
+            return alpha - _root(target, 0.0, self._half[a], p)
+        corners, rows = self._corner_columns[a], self._row_columns[a]
+        low, high = 0, a
+        if low == high:
+            return nodes[low]
+        sought = target - tolerance - first
+        while high - low > 1:
+            middle = (low + high) // 2
+            if corners[middle] + rows[middle] * p < sought:
+                high = middle
+            else:
+                low = middle
+        _, x, corner, row, column, cross, _, half = self._cells[a][low]
+        rest = target - first - corner - row * p
+        return x - _root(rest, column + cross * p, half, x - nodes[low])
+
+
+def _root(rest: float, slope: float, bend: float, width: float) -> float:
+    """Return d in [0, width] with slope d + bend d^2 = rest; all arguments non-negative."""
+    if rest <= 0.0:
+        return 0.0
+    denominator = slope + math.sqrt(slope * slope + 4.0 * bend * rest)
+    # 'not <' also catches the 0 / 0 of a weight so small that its square is lost.
+    if not 2.0 * rest < width * denominator:
+        return width
+    return 2.0 * rest / denominator
