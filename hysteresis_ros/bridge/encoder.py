@@ -1,0 +1,246 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Counts of an incremental quadrature encoder (AMT103) to angle and velocity.
+
+The AMT103 gives 2048 pulses per turn on each of two tracks, so 4 x 2048 = 8192 counts per turn,
+and one index pulse per turn. The counter of the board wraps, starts anywhere and knows nothing of
+the angle, so
+
+    angle = zero + direction * 2 pi / counts_per_revolution * counts
+"""
+
+import collections
+import math
+from typing import NamedTuple
+
+from hysteresis_ros.errors import ParameterError
+
+AMT103_PULSES = 2048
+AMT103_COUNTS = 4 * AMT103_PULSES
+
+INDEX_USES = ('ignore', 'check', 'home')
+INDEX_TOLERANCE = 4   # counts: one quadrature cycle, the width of the index pulse
+
+
+class Reading(NamedTuple):
+    """
+    One reading of the encoder.
+
+    Attributes
+    ----------
+    angle : float
+        Angle in rad; the last believable one if `fresh` is False.
+    velocity : float
+        Angular velocity in rad/s, mean over the velocity window.
+    fresh : bool
+        Whether this sample was believed.
+    fault : str
+        What is wrong, or ''. Faults that leave the angle in doubt stay until `forgive`.
+
+    """
+
+    angle: float
+    velocity: float
+    fresh: bool
+    fault: str
+
+
+class Encoder:
+    """
+    Angle from counts: direction, zero, wrapping, index and checks.
+
+    Parameters
+    ----------
+    counts_per_revolution : int
+        Quadrature counts per turn.
+    direction : int
+        1 if counts grow with the angle, -1 if they fall.
+    zero : float
+        Angle in rad at count 0.
+    counter_bits : int
+        Width of the board's counter, after which it wraps: 16 or 32.
+    maximum_speed : float
+        Angular speed in rad/s that the arm cannot exceed; a larger jump is a fault.
+    velocity_window : float
+        Time in s over which the velocity is taken; at least two samples are used.
+    index : str
+        What to do at an index pulse: 'ignore'; 'check' that it comes at the same place every
+        turn; 'home': the angle there is `index_angle`.
+    index_angle : float
+        Angle in rad at the index pulse, for 'home'.
+
+    Raises
+    ------
+    ParameterError
+        If a value makes no sense.
+
+    """
+
+    def __init__(self, counts_per_revolution=AMT103_COUNTS, direction=1, zero=0.0,
+                 counter_bits=32, maximum_speed=30.0, velocity_window=0.1, index='ignore',
+                 index_angle=0.0):
+        if counts_per_revolution < 4:
+            raise ParameterError(f'counts_per_revolution {counts_per_revolution}: at least 4')
+        if direction not in (-1, 1):
+            raise ParameterError(f'encoder_direction {direction}: 1 or -1')
+        if counter_bits not in (16, 32):
+            raise ParameterError(f'encoder counter of {counter_bits} bits: 16 or 32')
+        if index not in INDEX_USES:
+            raise ParameterError(f'encoder_index {index!r}: use one of {", ".join(INDEX_USES)}')
+        if not (maximum_speed > 0.0 and velocity_window >= 0.0
+                and math.isfinite(zero) and math.isfinite(index_angle)):
+            raise ParameterError('encoder: maximum_speed has to be positive, velocity_window not '
+                                 'negative, zero and index_angle finite')
+        self.counter_bits = counter_bits
+        self._counts_per_revolution = counts_per_revolution
+        self._scale = direction * 2.0 * math.pi / counts_per_revolution
+        self._zero = zero
+        self._maximum_speed = maximum_speed
+        self._window = velocity_window
+        self._index_use = index
+        self._index_angle = index_angle
+        self.reset()
+
+    def reset(self):
+        """Forget everything: the next sample is the first."""
+        self._position = None       # counts from the angle `zero`, unwrapped
+        self._counter = None        # the counter as last believed
+        self._time = None
+        self._suspect = None        # (time, counter) of a sample that was not believed
+        self._restarted = False
+        self._history = collections.deque()
+        self._index = None
+        self._index_position = None
+        self._doubt = ''
+
+    def restart(self):
+        """
+        Take note that the board has started anew, so that its counter begins again.
+
+        The arm is taken to be where it was; that is a fault until the index or `forgive` says
+        otherwise.
+        """
+        if self._position is not None:
+            self._restarted = True
+            self._doubt = ('the board has started anew: its encoder counter was lost, the angle '
+                           'is carried on from before and may be off')
+
+    def forgive(self):
+        """Drop the doubt about the angle, because somebody has checked it."""
+        self._doubt = ''
+        self._index_position = None
+
+    @property
+    def angle(self):
+        """Angle in rad of the last sample that was believed; None before the first."""
+        return None if self._position is None else self._angle(self._position)
+
+    def update(self, time, counter, index=0, latch=None):
+        """
+        Take one sample.
+
+        Parameters
+        ----------
+        time : float
+            Time in s of the board's clock, not falling.
+        counter : int
+            The board's counter.
+        index : int
+            How many index pulses the board has seen.
+        latch : int, optional
+            The counter at the latest index pulse.
+
+        Returns
+        -------
+        Reading
+
+        """
+        if self._position is None or self._restarted:
+            self._begin(time, counter)
+            self._look_at_index(counter, index, latch)
+            return self._reading(True, '')
+        step = self._wrap(counter - self._counter)
+        if abs(step) > self._possible(time - self._time):
+            if not self._agrees_with_suspect(time, counter):
+                self._suspect = (time, counter)
+                return self._reading(False, f'encoder counts jumped by {step} within '
+                                     f'{time - self._time:.3g} s, which the arm cannot do: '
+                                     'sample not believed; check cable and supply')
+            self._doubt = (f'encoder counts jumped by {step} and stayed there: the angle may be '
+                           'off; check cable and coupling')
+            self._history.clear()
+        self._suspect = None
+        self._position += step
+        self._counter = counter
+        self._time = time
+        self._remember(time)
+        self._look_at_index(counter, index, latch)
+        return self._reading(True, '')
+
+    def _begin(self, time, counter):
+        if not self._restarted:
+            self._position = self._wrap(counter)
+        self._counter = counter
+        self._time = time
+        self._index = None
+        self._suspect = None
+        self._restarted = False
+        self._history.clear()
+        self._remember(time)
+
+    def _agrees_with_suspect(self, time, counter):
+        if self._suspect is None:
+            return False
+        since, suspect = self._suspect
+        return abs(self._wrap(counter - suspect)) <= self._possible(time - since)
+
+    def _possible(self, duration):
+        """Return how many counts the arm can turn within `duration`, and one for rounding."""
+        return self._maximum_speed * max(duration, 0.0) / abs(self._scale) + 1.0
+
+    def _wrap(self, difference):
+        half = 1 << (self.counter_bits - 1)
+        return (difference + half) % (2 * half) - half
+
+    def _remember(self, time):
+        history = self._history
+        history.append((time, self._position))
+        while len(history) > 2 and history[1][0] <= time - self._window:
+            history.popleft()
+
+    def _look_at_index(self, counter, index, latch):
+        if latch is None or index == self._index or self._index_use == 'ignore':
+            return
+        self._index = index
+        self._at_index(self._position - self._wrap(counter - latch))
+
+    def _at_index(self, position):
+        """Compare or correct the position with the index pulse that came at `position`."""
+        first = self._index_position is None
+        if self._index_use == 'home':
+            self._index_position = round((self._index_angle - self._zero) / self._scale)
+        elif first:
+            self._index_position = position
+        turn = self._counts_per_revolution
+        error = (position - self._index_position + turn // 2) % turn - turn // 2
+        if self._index_use == 'home':
+            self._move(-error)
+            self._doubt = ''
+        if abs(error) > INDEX_TOLERANCE and not (first and self._index_use == 'home'):
+            self._doubt = (f'the index pulse came {error} counts off its place: counts were lost, '
+                           'the angle ' + ('was put right' if self._index_use == 'home'
+                                           else 'may be off') + '; check cable and coupling')
+
+    def _move(self, counts):
+        self._position += counts
+        self._history = collections.deque(
+            (time, position + counts) for time, position in self._history)
+
+    def _angle(self, position):
+        return self._zero + self._scale * position
+
+    def _reading(self, fresh, fault):
+        (start, before), (end, now) = self._history[0], self._history[-1]
+        velocity = self._scale * (now - before) / (end - start) if end > start else 0.0
+        return Reading(self._angle(self._position), velocity, fresh, fault or self._doubt)
