@@ -210,7 +210,7 @@ class BicepGeometry:
             raise RangeError(f'target angle is {theta}; it has to be a finite number in rad')
         if not low <= theta <= high:
             raise RangeError(
-                f'target angle {theta:.4f} rad is outside the linkage\'s range of '
+                f"target angle {theta:.4f} rad is outside the linkage's range of "
                 f'{low:.4f} to {high:.4f} rad ({math.degrees(low):.1f} to '
                 f'{math.degrees(high):.1f} deg)')
 

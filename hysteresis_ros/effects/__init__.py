@@ -1,0 +1,12 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The catalogue of physical effects that a model may be missing."""
+
+from hysteresis_ros.effects.base import (
+    STAGES, DriveEffect, Effect, Inputs, MaterialEffect, MechanismEffect, Parameter, SensorEffect,
+    Statics, Surroundings)
+from hysteresis_ros.effects.catalogue import catalogue, effect_class
+
+__all__ = [
+    'STAGES', 'DriveEffect', 'Effect', 'Inputs', 'MaterialEffect', 'MechanismEffect', 'Parameter',
+    'SensorEffect', 'Statics', 'Surroundings', 'catalogue', 'effect_class']

@@ -1,0 +1,316 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a physical effect is: a named correction of one stage between the drive and the sensor.
+
+Stages follow each other in the order of the data, and effects are composed in that order::
+
+    drive -> electrical -> thermal -> material (hysteresis, load) <-> mechanism -> sensor
+
+An effect knows its parameters with unit and plausible range, its forward map, and its inverse where
+a controller can undo it. Effects with dynamics or memory of their own carry it in `start` and
+`step`; all others are pure functions of arrays.
+"""
+
+import abc
+import dataclasses
+import math
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from hysteresis_ros.errors import ParameterError
+
+STAGES = ('electrical', 'thermal', 'material', 'mechanism', 'sensor')
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """
+    One number of an effect.
+
+    Parameters
+    ----------
+    name, unit, description : str
+        Name, unit and meaning.
+    low, high : float
+        Plausible range; an estimate outside it stands in for something else.
+    neutral : float
+        The value at which the effect vanishes.
+    starts : tuple of float
+        Values from which a fit starts.
+    log : bool
+        Whether the fit moves on a logarithmic scale (positive parameters over decades).
+    both_signs : bool
+        Whether minus the range is as plausible as the range.
+    choices : tuple of float
+        For a parameter that is tried at these values instead of being fitted.
+    kinds : tuple of str
+        Kinds of measurement, 'arm' or 'bench', on which it is fitted; else it keeps its value.
+    """
+
+    name: str
+    unit: str
+    description: str
+    low: float
+    high: float
+    neutral: float
+    starts: tuple
+    log: bool = False
+    both_signs: bool = False
+    choices: tuple = ()
+    kinds: tuple = ('arm', 'bench')
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Limits for a fit: the range widened, so that an implausible value can show itself."""
+        if self.choices:
+            return min(self.choices), max(self.choices)
+        if self.log:
+            return self.low / 5.0, self.high * 5.0
+        if self.both_signs:
+            return -2.0 * self.high, 2.0 * self.high
+        margin = 0.5 * (self.high - self.low)
+        return min(self.low - margin, self.neutral), self.high + margin
+
+    def plausible(self, value: float) -> bool:
+        """Whether `value` lies in the physical range."""
+        if self.choices:
+            return value in self.choices
+        size = abs(value) if self.both_signs else value
+        return self.low <= size <= self.high
+
+
+class Inputs(NamedTuple):
+    """
+    What was recorded beside the drive, as arrays of one trial or as scalars of one moment.
+
+    `time` [s] runs from the start of the trial, `clock` [s] from the start of the recording, `step`
+    is the time since the row before [s]; `ambient` [degC] is NaN where not recorded; `phase` is the
+    martensite share (0 hot and short, 1 cold and long) of a first pass; `cycles` counts the travel
+    of the drive since the recording began, in full strokes there and back.
+    """
+
+    time: object
+    clock: object
+    step: object
+    ambient: object
+    phase: object
+    cycles: object
+
+
+class Surroundings(NamedTuple):
+    """
+    What an effect may have to know of the muscle: scales taken from the model, never fitted.
+
+    `length` is the muscle's resting length in the response's unit (1 for a strain), `load` the
+    mean load of the bench, `heat` the largest heat seen there (drive squared where the drive heats
+    a wire), `span` the response's range, `drive`, `load_name` and `response` what they are.
+    """
+
+    length: float
+    load: float
+    heat: float
+    span: float
+    drive: str = 'voltage'
+    load_name: str | None = 'force'
+    response: str = 'length'
+
+
+class Effect(abc.ABC):
+    """
+    One physical effect with its parameter values.
+
+    Parameters
+    ----------
+    surroundings : Surroundings, optional
+        The muscle it belongs to, where units or ranges of parameters depend on it.
+    **values : float
+        Values of the parameters; those left out are neutral.
+
+    Raises
+    ------
+    ParameterError
+        For a name it does not have or a value that is not finite.
+    """
+
+    id: ClassVar[str]
+    stage: ClassVar[str]
+    sentence: ClassVar[str]
+    equation: ClassVar[str]
+    source: ClassVar[str]
+    shows_in: ClassVar[str]
+    experiment: ClassVar[str]
+    confused_with: ClassVar[tuple] = ()
+    parameters: ClassVar[tuple] = ()
+    # Effects whose own equation contains that of another one, which it then replaces.
+    replaces: ClassVar[tuple] = ()
+    # Kinds of measurement in which the effect can show.
+    kinds: ClassVar[tuple] = ('arm',)
+    # Whether only a recording with transients can show it.
+    needs_transients: ClassVar[bool] = False
+    # Whether the maps need the martensite share, which a first pass without them gives.
+    needs_phase: ClassVar[bool] = False
+    # A recorded column without which the effect cannot be told.
+    needs_column: ClassVar[str | None] = None
+    invertible: ClassVar[bool] = True
+
+    def __init__(self, surroundings: Surroundings | None = None, **values: float):
+        self.parameters = self.describe(surroundings)
+        names = [parameter.name for parameter in self.parameters]
+        for name, value in values.items():
+            if name not in names:
+                raise ParameterError(
+                    f'effect {self.id} has no parameter {name!r}; it has {", ".join(names)}')
+            if not math.isfinite(value):
+                raise ParameterError(f'effect {self.id}: {name} must be finite, not {value!r}')
+        self.values = {parameter.name: float(values.get(parameter.name, parameter.neutral))
+                       for parameter in self.parameters}
+        self.intervals: dict[str, tuple[float, float]] = {}
+
+    def __getattr__(self, name: str) -> float:
+        """Read a parameter's value as an attribute, so that equations stay readable."""
+        values = self.__dict__.get('values', {})
+        if name in values:
+            return values[name]
+        raise AttributeError(f'{type(self).__name__} has no attribute {name!r}')
+
+    @classmethod
+    def describe(cls, surroundings: Surroundings | None) -> tuple:
+        """Return the parameters with the units and ranges that suit the muscle."""
+        return cls.parameters
+
+    def with_values(self, **values: float) -> 'Effect':
+        """Return a copy with some values changed."""
+        copy = type(self)(**{**self.values, **values})
+        copy.parameters = self.parameters
+        return copy
+
+    def implausible(self) -> list[str]:
+        """Name the parameters that lie outside their physical range; neutral ones are not used."""
+        return [parameter.name for parameter in self.parameters
+                if self.values[parameter.name] != parameter.neutral
+                and not parameter.plausible(self.values[parameter.name])]
+
+    def to_dict(self) -> dict:
+        """Return plain types for the model file."""
+        units = {parameter.name: parameter.unit for parameter in self.parameters}
+        return {'id': self.id, 'parameters': {
+            name: {'value': value, 'low': self.intervals.get(name, (value, value))[0],
+                   'high': self.intervals.get(name, (value, value))[1], 'unit': units[name]}
+            for name, value in self.values.items()}}
+
+    @classmethod
+    def available(cls, surroundings: Surroundings) -> bool:
+        """Whether the effect makes sense for this muscle, whatever was recorded."""
+        return True
+
+
+class DriveEffect(Effect):
+    """
+    Effect between the drive that was set and the steady-state drive that the muscle feels.
+
+    An electrical effect maps the drive, a thermal one the heat (the drive squared where it is a
+    voltage or a current, the drive itself where it is a temperature, pressure or power).
+    """
+
+    def forward(self, signal, inputs: Inputs, surroundings: Surroundings):
+        """Map the signal of one trial, shape (rows,); stateless ones take scalars as well."""
+        self.start()
+        steps = np.broadcast_to(inputs.step, np.shape(signal))
+        phases = np.broadcast_to(inputs.phase, np.shape(signal))
+        return np.array([
+            self.step(float(value), float(step), float(phase), surroundings)
+            for value, step, phase in zip(signal, steps, phases)])
+
+    def start(self) -> None:
+        """Forget the past: the muscle is cold and at rest."""
+
+    def step(self, value: float, step: float, phase: float,
+             surroundings: Surroundings) -> float:
+        """Advance by `step` [s] under the constant input `value`."""
+        inputs = Inputs(0.0, 0.0, step, math.nan, phase, 0.0)
+        return float(self.forward(value, inputs, surroundings))
+
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
+        """Return the input for which the output becomes `signal`; identity if not possible."""
+        return signal
+
+
+class MaterialEffect(Effect):
+    """
+    Effect on the muscle's relation ``L = L0 + S(F) (H2[s (x - c F)] - L0) + e(F) + o``.
+
+    The transformation is H2 of the drive x shifted by the load F; S scales its strain, e is what
+    the load alone stretches, and o is what time does. Each method has a neutral default.
+    """
+
+    stage = 'material'
+
+    def shift_load(self, load, surroundings: Surroundings):
+        """Return what is added to the load inside the transformation, in units of the load."""
+        return 0.0 * load
+
+    def scale(self, load, surroundings: Surroundings):
+        """Return the factor on the transformation strain under `load`."""
+        return 1.0 + 0.0 * load
+
+    def stretch(self, load, surroundings: Surroundings):
+        """Return the elongation under `load` that does not depend on the transformation."""
+        return 0.0 * load
+
+    def drift(self, drive, heat, inputs: Inputs, surroundings: Surroundings):
+        """Return offset and factor per row, each shape (rows,), that time and history add."""
+        return np.zeros(len(drive)), np.ones(len(drive))
+
+
+@dataclasses.dataclass
+class Statics:
+    """
+    The arm at rest on a grid of angles: what the linkage asks of each muscle.
+
+    All arrays have shape (n,): `theta` [rad], elongation `length` [m], `moment_arm` [m], and the
+    total `moment` [N m] that the muscles have to hold.
+    """
+
+    theta: np.ndarray
+    length: np.ndarray
+    moment_arm: np.ndarray
+    moment: np.ndarray
+
+
+class MechanismEffect(Effect):
+    """Effect on the arm: what it asks of the muscle at rest, and what resists its motion."""
+
+    stage = 'mechanism'
+
+    def forward(self, statics: Statics, geometry) -> Statics:
+        """Return the arm at rest with the effect; by default unchanged."""
+        return statics
+
+    # Moments that resist motion: Coulomb [N m], viscous [N m s/rad], inertia [kg m^2].
+    def resistance(self) -> tuple[float, float, float]:
+        """Return Coulomb moment, viscous coefficient and moment of inertia."""
+        return 0.0, 0.0, 0.0
+
+
+class SensorEffect(Effect):
+    """Effect between the true response and the measured one."""
+
+    stage = 'sensor'
+    kinds = ('arm', 'bench')
+
+    def forward(self, response, inputs: Inputs):
+        """Map the response of one trial, shape (rows,)."""
+        return response
+
+    def start(self) -> None:
+        """Forget the past."""
+
+    def step(self, value: float, step: float) -> float:
+        """Advance by one sample taken `step` seconds after the one before."""
+        return value
+
+    def inverse(self, response: float) -> float:
+        """Return the true response that is measured as `response`."""
+        return response

@@ -1,0 +1,75 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""All effects that are known: the package's own and those that users have installed."""
+
+import functools
+import inspect
+from importlib import metadata
+
+from hysteresis_ros.effects import electrical, material, mechanism, sensor, thermal
+from hysteresis_ros.effects.base import STAGES, Effect
+from hysteresis_ros.errors import ParameterError
+
+ENTRY_POINT_GROUP = 'hysteresis_ros.effects'
+
+
+def _own() -> list[type[Effect]]:
+    found = []
+    for module in (electrical, thermal, material, mechanism, sensor):
+        found += [member for member in vars(module).values()
+                  if inspect.isclass(member) and issubclass(member, Effect)
+                  and member.__module__ == module.__name__ and 'id' in vars(member)]
+    return found
+
+
+def _installed() -> list[type[Effect]]:
+    found = []
+    for entry in metadata.entry_points(group=ENTRY_POINT_GROUP):
+        try:
+            effect = entry.load()
+        except Exception as error:
+            raise ParameterError(
+                f'effect {entry.name!r} of entry point {entry.value!r} cannot be loaded: {error}; '
+                'mend or uninstall that package') from None
+        if not (inspect.isclass(effect) and issubclass(effect, Effect)):
+            raise ParameterError(
+                f'entry point {entry.value!r} is no subclass of hysteresis_ros.effects.Effect')
+        found.append(effect)
+    return found
+
+
+@functools.cache
+def catalogue() -> dict[str, type[Effect]]:
+    """
+    Return the classes of all effects by identifier, in the order of the stages.
+
+    Raises
+    ------
+    ParameterError
+        If an installed effect cannot be loaded, is of an unknown stage, or takes a name that is
+        already there.
+    """
+    effects: dict[str, type[Effect]] = {}
+    for effect in _own() + _installed():
+        if effect.stage not in STAGES:
+            raise ParameterError(
+                f'effect {effect.id}: stage {effect.stage!r} is none of {", ".join(STAGES)}')
+        if effect.id in effects:
+            raise ParameterError(f'two effects are called {effect.id!r}; rename one')
+        effects[effect.id] = effect
+    return dict(sorted(effects.items(), key=lambda item: STAGES.index(item[1].stage)))
+
+
+def effect_class(name: str) -> type[Effect]:
+    """
+    Return the class of the effect called `name`.
+
+    Raises
+    ------
+    ParameterError
+        If there is none; the message lists those there are.
+    """
+    effects = catalogue()
+    if name not in effects:
+        raise ParameterError(f'there is no effect {name!r}; there are {", ".join(effects)}')
+    return effects[name]

@@ -1,0 +1,96 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects between the voltage that was set and the heat in the wire."""
+
+import numpy as np
+
+from hysteresis_ros.effects.base import DriveEffect, Parameter
+
+ELECTRIC_DRIVES = ('voltage', 'current')
+
+
+class ElectricalEffect(DriveEffect):
+    """An effect that only an electrically heated muscle can have."""
+
+    stage = 'electrical'
+
+    @classmethod
+    def available(cls, surroundings):
+        """Whether the drive is a voltage or a current."""
+        return surroundings.drive in ELECTRIC_DRIVES
+
+
+class SupplySag(ElectricalEffect):
+    """Resistance of leads, switch and supply in series with the wire."""
+
+    id = 'supply_sag'
+    sentence = 'The supply and the leads drop a part of the voltage before it reaches the wire.'
+    equation = 'Ve = V R / (R + Rs), R = 8 Ohm'
+    source = "Ohm's law"
+    shows_in = 'V: the arm stays behind in proportion to the voltage'
+    experiment = 'measure the voltage at the wire itself while it is heated'
+    confused_with = ('airflow',)
+    parameters = (
+        Parameter('Rs', 'Ohm', 'series resistance against a wire of 8 Ohm', 0.05, 2.0, 0.0,
+                  (0.3, 1.0), log=True),)
+
+    WIRE_RESISTANCE = 8.0
+
+    def forward(self, signal, inputs, surroundings):
+        """Divide the voltage between series resistance and wire."""
+        return signal * self.WIRE_RESISTANCE / (self.WIRE_RESISTANCE + self.Rs)
+
+    def inverse(self, signal, inputs, surroundings):
+        """Raise the voltage by what is lost."""
+        return signal * (self.WIRE_RESISTANCE + self.Rs) / self.WIRE_RESISTANCE
+
+
+class PwmDeadZone(ElectricalEffect):
+    """Pulses too short to switch the transistor on."""
+
+    id = 'pwm_dead_zone'
+    sentence = 'Below a smallest duty the board delivers nothing; above it the voltage is scaled.'
+    equation = 'Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd)'
+    source = 'switching and dead time of a PWM stage'
+    shows_in = 'low V'
+    experiment = 'fine steps of the voltage near 0'
+    confused_with = ('ambient_drift',)
+    parameters = (
+        Parameter('Vd', 'V', 'largest voltage that has no effect', 0.05, 1.5, 0.0, (0.3, 1.0),
+                  log=True),)
+
+    def forward(self, signal, inputs, surroundings):
+        """Cut the lower end off and stretch the rest."""
+        full = np.sqrt(surroundings.heat)
+        span = max(full - self.Vd, 1e-3 * full)
+        return np.maximum(signal - self.Vd, 0.0) * full / span
+
+    def inverse(self, signal, inputs, surroundings):
+        """Add the dead zone again; zero stays zero."""
+        full = np.sqrt(surroundings.heat)
+        return signal * (full - self.Vd) / full + self.Vd if signal > 0.0 else 0.0
+
+
+class ResistanceChange(ElectricalEffect):
+    """Austenite and martensite conduct differently."""
+
+    id = 'resistance_change'
+    sentence = ("The wire's resistance changes as it transforms, so the same voltage heats the "
+                'two phases differently.')
+    equation = 'heat = V^2 / (1 + eta (xi - 1)), xi the martensite share'
+    source = "the paper's reference [46]: less than 15 % in phase transition"
+    shows_in = 'the middle of the loop'
+    experiment = 'log the current as well as the voltage'
+    confused_with = ('stress_dependence',)
+    needs_phase = True
+    parameters = (
+        Parameter('eta', '1', 'relative change of resistance from martensite to austenite',
+                  0.02, 0.20, 0.0, (-0.1, 0.1), both_signs=True),)
+
+    def forward(self, signal, inputs, surroundings):
+        """Return the voltage that heats a wire of constant resistance as much."""
+        return signal / np.sqrt(np.maximum(1.0 + self.eta * (inputs.phase - 1.0), 0.1))
+
+    def inverse(self, signal, inputs, surroundings):
+        """Undo the change at the phase that is to be reached."""
+        return signal * float(np.sqrt(max(1.0 + self.eta * (inputs.phase - 1.0), 0.1)))

@@ -1,0 +1,266 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Effects on the muscle itself: how load, time and use change ``L = H2[s (x - c F)]``.
+
+Those of the load (`stress_dependence`, `stress_dependent_strain`, `series_compliance`) are part of
+what a bench measures, so adding them on bench tables refits the weights of H2.
+"""
+
+import numpy as np
+
+from hysteresis_ros.effects.base import MaterialEffect, Parameter, Surroundings
+
+
+class StressDependence(MaterialEffect):
+    """The load shifts the transformation along the temperature axis."""
+
+    id = 'stress_dependence'
+    sentence = 'Load shifts the transformation to higher temperatures (Clausius-Clapeyron).'
+    equation = ('T -> T - sigma / C: H2[F - C T], where V^2 stands for T in a heated wire; '
+                'on the arm alone: F -> F + shift (F - Fm)')
+    source = 'Clausius-Clapeyron relation of shape memory alloys; Eq. 2 of the paper'
+    shows_in = 'load at the same drive'
+    experiment = 'the same loop under three or more loads'
+    confused_with = ('supply_sag', 'series_compliance')
+    kinds = ('arm', 'bench')
+    SHIFT = Parameter('shift', '1', 'influence of the load against that in the bench model, less '
+                      'one', 0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',))
+    # Load per heat: of a 0.2 mm wire 5 to 15 MPa/K at 2 to 12 K/V^2, of any other drive unknown.
+    RANGES = {('voltage', 'force'): ('N/V^2', 0.2, 6.0), ('current', 'force'): ('N/A^2', 1., 1e3),
+              ('temperature', 'stress'): ('MPa/K', 5.0, 15.0),
+              ('temperature', 'force'): ('N/K', 0.01, 100.0)}
+    PREFIX = {'MPa/K': 1e6}
+
+    @classmethod
+    def describe(cls, surroundings):
+        """Give C the unit and range of this muscle's load and drive."""
+        if surroundings is None:
+            surroundings = Surroundings(1.0, 1.0, 1.0, 1.0)
+        unit, low, high = cls.RANGES.get(
+            (surroundings.drive, surroundings.load_name),
+            ('load/heat', 1e-3 * surroundings.load / surroundings.heat,
+             1e3 * surroundings.load / surroundings.heat))
+        starts = tuple(float(value) for value in np.geomspace(low, high, 5)[1:-1])
+        return (Parameter('C', unit, 'load that shifts the transformation by one unit of heat',
+                          low, high, 0.0, starts, log=True, kinds=('bench',)), cls.SHIFT)
+
+    parameters = (SHIFT,)
+
+    @property
+    def load_per_heat(self) -> float:
+        """Return C in units of load over heat; 0 keeps the model's own first stage."""
+        return self.C * self.PREFIX.get(self.parameters[0].unit, 1.0)
+
+    def shift_load(self, load, surroundings):
+        """Weigh the deviation from the bench's mean load more or less."""
+        return self.shift * (load - surroundings.load)
+
+    @classmethod
+    def available(cls, surroundings):
+        """Whether a load was there at all."""
+        return surroundings.load > 0.0
+
+
+class StressDependentStrain(MaterialEffect):
+    """A higher load orients more martensite, so the stroke grows until it saturates."""
+
+    id = 'stress_dependent_strain'
+    sentence = 'The transformation strain grows with the load and saturates.'
+    equation = "S(F) = (1 - r exp(-F / F0)) / (1 - r exp(-Fm / F0)), Fm the bench's mean load"
+    source = 'orientation of martensite variants under stress'
+    shows_in = 'load, cold side'
+    experiment = 'the same loop under three or more loads'
+    confused_with = ('series_compliance',)
+    kinds = ('arm', 'bench')
+    parameters = (
+        Parameter('r', '1', 'share of the strain that is missing without load', 0.02, 1.0, 0.0,
+                  (0.3, 0.8)),
+        Parameter('F0', 'loads', "load scale of the saturation over the bench's mean load",
+                  0.1, 3.0, 1.0, (0.5, 1.5), log=True),)
+
+    def scale(self, load, surroundings):
+        """Grow with the load, one at the bench's mean load."""
+        scale = self.F0 * surroundings.load
+        share = 1.0 - self.r * np.exp(-np.maximum(load, 0.0) / scale)
+        return share / max(1.0 - self.r * np.exp(-1.0 / self.F0), 1e-3)
+
+    @classmethod
+    def available(cls, surroundings):
+        """Whether a load was there at all."""
+        return surroundings.load > 0.0
+
+
+class SeriesCompliance(MaterialEffect):
+    """Crimps, cables and the wire's own elasticity stretch with the load."""
+
+    id = 'series_compliance'
+    sentence = 'The load stretches crimps, cable and wire elastically.'
+    equation = 'L += F / k'
+    source = "Hooke's law"
+    shows_in = 'force'
+    experiment = 'hang weights on the cold muscle'
+    confused_with = ('payload_error', 'geometry_error')
+    kinds = ('arm', 'bench')
+    parameters = (
+        Parameter('compliance', 'mm/N', 'elongation per load', 0.005, 0.5, 0.0, (0.02, 0.1),
+                  log=True),)
+
+    UNITS = {'mm/N': 1e-3, '1/GPa': 1e-9}
+
+    @classmethod
+    def describe(cls, surroundings):
+        """Give the compliance the unit of this muscle's response and load."""
+        if surroundings is None or surroundings.load_name == 'force':
+            return cls.parameters
+        return (Parameter('compliance', '1/GPa', 'strain per stress', 0.004, 0.3, 0.0, (0.02, 0.1),
+                          log=True),)
+
+    def stretch(self, load, surroundings):
+        """Return the elastic elongation beyond that at the bench's mean load."""
+        compliance = self.compliance * self.UNITS[self.parameters[0].unit]
+        return compliance * (load - surroundings.load)
+
+    @classmethod
+    def available(cls, surroundings):
+        """Whether a load was there at all."""
+        return surroundings.load > 0.0
+
+
+class RPhase(MaterialEffect):
+    """An intermediate phase takes up a share of the strain early and nearly without hysteresis."""
+
+    id = 'r_phase'
+    sentence = 'A part of the strain comes early, in a narrow step with little hysteresis.'
+    equation = 'L -= p l0 s((q -+ w/2 - q0) / d), s the logistic step, q the heat'
+    source = 'R-phase transformation of NiTi: 0.3 to 1 % strain, 2 to 5 K hysteresis'
+    shows_in = 'a shoulder on cooling at low load'
+    experiment = 'a fine staircase of cooling steps'
+    confused_with = ('slack',)
+    kinds = ('arm', 'bench')
+    parameters = (
+        Parameter('strain', '% of l0', 'strain of the step', 0.05, 1.0, 0.0, (0.2, 0.5), log=True),
+        Parameter('position', '1', 'heat q0 at the step over the largest heat', 0.05, 0.8, 0.3,
+                  (0.15, 0.35, 0.55)),
+        Parameter('width', '1', 'width d of the step over the largest heat', 0.005, 0.1, 0.03,
+                  (0.03,), log=True),)
+
+    LOOP = 0.03
+
+    def drift(self, drive, heat, inputs, surroundings):
+        """Return the strain of the step, with a small play as its hysteresis."""
+        half = 0.5 * self.LOOP * surroundings.heat
+        played = np.empty(len(heat))
+        state = 0.0
+        for row, value in enumerate(heat.tolist()):
+            state = min(max(state, value - half), value + half)
+            played[row] = state
+        argument = (played / surroundings.heat - self.position) / self.width
+        step = 0.5 * (1.0 + np.tanh(0.5 * argument))
+        return -self.strain / 100.0 * surroundings.length * step, np.ones(len(drive))
+
+
+class Creep(MaterialEffect):
+    """The muscle goes on moving in the direction of its last step."""
+
+    id = 'creep'
+    sentence = 'After a step the muscle goes on moving the same way, with the logarithm of time.'
+    equation = 'L += -+ c l0 ln(1 + t / t0) since the last step'
+    source = 'logarithmic creep'
+    shows_in = 'log time in a hold'
+    experiment = 'holds of 300 s'
+    confused_with = ('thermal_lag', 'ambient_drift')
+    kinds = ('arm', 'bench')
+    needs_transients = True
+    invertible = False
+    parameters = (
+        Parameter('c', '% of l0', 'strain per factor e of time after a step through the whole '
+                  'drive', 0.01, 0.5, 0.0, (0.03, 0.15), log=True),
+        Parameter('t0', 's', 'time from which the logarithm counts', 0.5, 30.0, 3.0, (3.0,),
+                  log=True),)
+
+    # A change of the drive by less than this share of its range is a hold.
+    HOLD = 1e-3
+
+    def drift(self, drive, heat, inputs, surroundings):
+        """Return the strain since each row's last step, in that step's direction."""
+        time = np.asarray(inputs.time, dtype=float)
+        change = np.diff(drive, prepend=drive[:1])
+        full = max(np.ptp(drive), 1e-12)
+        moving = np.abs(change) > self.HOLD * full
+        moving[0] = True
+        rows = np.arange(len(drive))
+        last = np.maximum.accumulate(np.where(moving, rows, 0))
+        since = time - time[last]
+        # A ramp is many small steps: what a hold after it shows is the whole ramp's.
+        run = np.cumsum(np.r_[True, np.sign(change[1:]) != np.sign(change[:-1])] & moving)
+        starts = np.maximum.accumulate(np.where(np.diff(run, prepend=-1) > 0, rows, 0))
+        before = np.maximum(starts[last] - 1, 0)
+        size = (drive[last] - drive[before]) / full
+        strain = np.log1p(since / self.t0) * size
+        return -self.c / 100.0 * surroundings.length * strain, np.ones(len(drive))
+
+
+class Fatigue(MaterialEffect):
+    """Cycle after cycle the muscle gets longer, or its stroke shorter."""
+
+    id = 'fatigue'
+    sentence = 'With every cycle the muscle drifts and its stroke shrinks.'
+    equation = 'L -= b l0 ln(1 + N), stroke times (1 - a ln(1 + N)), N the number of cycles'
+    source = 'functional fatigue of shape memory alloys'
+    shows_in = 'cycle count'
+    experiment = 'repeat a reference loop and compare the first with the last'
+    confused_with = ('ambient_drift',)
+    kinds = ('arm', 'bench')
+    parameters = (
+        Parameter('b', '% of l0', 'drift per factor e of the number of cycles', 0.0, 0.5, 0.0,
+                  (0.05, -0.05), both_signs=True),
+        Parameter('a', '1', 'loss of stroke per factor e of the number of cycles', 0.0, 0.3, 0.0,
+                  (0.03,), both_signs=True),)
+
+    def drift(self, drive, heat, inputs, surroundings):
+        """Return drift and stroke for the cycles counted since the recording began."""
+        cycles = inputs.cycles
+        logarithm = np.log1p(cycles)
+        offset = -self.b / 100.0 * surroundings.length * logarithm
+        return offset, np.maximum(1.0 - self.a * logarithm, 0.1)
+
+
+class Slack(MaterialEffect):
+    """The muscle hangs loose over a part of the way."""
+
+    id = 'slack'
+    sentence = 'A dead length has to be taken up before the muscle pulls.'
+    equation = "F = max(F, 0), L += Ls exp(-F / Fs), Fs half the bench's mean load"
+    source = 'unilateral contact'
+    shows_in = 'low force'
+    experiment = 'sweep the preload'
+    confused_with = ('r_phase', 'geometry_error')
+    parameters = (
+        Parameter('Ls', 'mm', 'dead length', 0.1, 5.0, 0.0, (0.5, 2.0), log=True),)
+
+    def stretch(self, load, surroundings):
+        """Return the dead length that is still there under `load`."""
+        return 1e-3 * self.Ls * np.ones_like(load)
+
+
+class UnequalMuscles(MaterialEffect):
+    """Parallel muscles of different length do not share the load equally."""
+
+    id = 'unequal_muscles'
+    sentence = 'The parallel muscles differ in length, so one carries more than the others.'
+    equation = 'sum of F_i = n F, with L_i = L - dL_i for each muscle i'
+    source = 'the paper, Sec. VI-B: small length differences cause discrepancies'
+    shows_in = 'smeared knees'
+    experiment = 'run the arm on one muscle at a time'
+    confused_with = ('slack', 'geometry_error')
+    parameters = (
+        Parameter('shorter', 'mm', 'how much the shortest lacks against the middle one', 0.0, 8.0,
+                  0.0, (0.5, 2.0)),
+        Parameter('longer', 'mm', 'how much the longest exceeds the middle one', 0.0, 8.0, 0.0,
+                  (0.5, 2.0)),)
+
+    @property
+    def offsets(self) -> tuple[float, float, float]:
+        """Excess length [m] of each muscle."""
+        return -1e-3 * self.shorter, 0.0, 1e-3 * self.longer

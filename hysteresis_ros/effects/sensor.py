@@ -1,0 +1,117 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects between the true response and what the sensor says."""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.effects.base import Parameter, SensorEffect
+
+
+class EncoderOffset(SensorEffect):
+    """The encoder's zero is not where it should be."""
+
+    id = 'encoder_offset'
+    sentence = 'The encoder was zeroed at another angle than assumed.'
+    equation = 'theta_m = theta + offset'
+    source = 'incremental encoder'
+    shows_in = 'constant'
+    experiment = 'drive the arm against a hard stop of known angle'
+    confused_with = ('geometry_error',)
+    kinds = ('arm',)
+    parameters = (
+        Parameter('offset', 'deg', 'measured less true angle', 0.2, 15.0, 0.0, (-2.0, 2.0),
+                  both_signs=True),)
+
+    def forward(self, response, inputs):
+        """Add the offset."""
+        return response + math.radians(self.offset)
+
+    def step(self, value, step):
+        """Add the offset."""
+        return value + math.radians(self.offset)
+
+    def inverse(self, response):
+        """Take the offset away."""
+        return response - math.radians(self.offset)
+
+
+class Backlash(SensorEffect):
+    """Play between shaft and encoder."""
+
+    id = 'backlash'
+    sentence = 'The encoder stands still until the play at its coupling is used up.'
+    equation = 'play operator of width B between shaft and encoder'
+    source = 'play operator'
+    shows_in = 'reversals'
+    experiment = 'move the arm by hand and watch the counts'
+    confused_with = ('coulomb_friction',)
+    kinds = ('arm',)
+    parameters = (
+        Parameter('B', 'deg', 'width of the play', 0.2, 12.0, 0.0, (1.0, 4.0), log=True),)
+
+    def __init__(self, surroundings=None, **values):
+        super().__init__(surroundings, **values)
+        self.start()
+
+    def start(self):
+        """Forget the past: the play is centred at the first sample."""
+        self._state = None
+        self._target = None
+        self._lead = 0.0
+
+    def inverse(self, response):
+        """Go further by half the play in the direction of the motion."""
+        if self._target is not None and response != self._target:
+            self._lead = math.copysign(0.5 * math.radians(self.B), response - self._target)
+        self._target = response
+        return response + self._lead
+
+    def step(self, value, step):
+        """Move the encoder only when the play is used up."""
+        half = 0.5 * math.radians(self.B)
+        if self._state is None:
+            self._state = value
+        self._state = min(max(self._state, value - half), value + half)
+        return self._state
+
+    def forward(self, response, inputs):
+        """Step through the trial."""
+        self.start()
+        return np.array([self.step(value, 0.0) for value in response.tolist()])
+
+
+class Latency(SensorEffect):
+    """The measurement arrives late."""
+
+    id = 'latency'
+    sentence = 'The measured response is that of a moment ago.'
+    equation = 'theta_m(t) = theta(t - delay)'
+    source = 'transport delay of bus, filter and time stamps'
+    shows_in = 'dtheta/dt'
+    experiment = 'a fast chirp'
+    confused_with = ('thermal_lag',)
+    needs_transients = True
+    invertible = False
+    parameters = (
+        Parameter('delay', 's', 'age of a measurement', 0.005, 5.0, 0.0, (0.1, 1.0), log=True),)
+
+    def forward(self, response, inputs):
+        """Read the response of a moment ago."""
+        return np.interp(inputs.time - self.delay, inputs.time, response)
+
+    def __init__(self, surroundings=None, **values):
+        super().__init__(surroundings, **values)
+        self.start()
+
+    def start(self):
+        """Forget the past."""
+        self._past = []
+
+    def step(self, value, step):
+        """Interpolate in what was seen within the delay."""
+        self._past = [(age + step, old) for age, old in self._past if age < self.delay]
+        self._past.append((0.0, value))
+        ages, values = zip(*reversed(self._past))
+        return float(np.interp(self.delay, ages, values))

@@ -1,0 +1,209 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Effects on the heat balance of Eq. 1, ``dT/dt = -d1 (T - T0) + d2 V^2``.
+
+They work on the heat: the steady-state voltage squared, ``q = Vs^2 = (d1/d2) (T - T0)``, in which
+Eq. 1 reads ``dq/dt = d1 (V^2 - q)``. For a drive that is itself a temperature, pressure or power,
+the heat is the drive.
+"""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.effects.base import DriveEffect, Parameter
+from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
+
+
+class ThermalEffect(DriveEffect):
+    """An effect on the heat that the muscle feels."""
+
+    stage = 'thermal'
+
+
+class FirstOrderLag(ThermalEffect):
+    """
+    Shared by the effects with the dynamics of Eq. 1; the exact solution over each interval.
+
+    The input is held constant from one row to the next, as a board holds its setpoint.
+    """
+
+    needs_transients = True
+    kinds = ('arm', 'bench')
+
+    # How much faster than on the bench heat is exchanged: beta of `airflow`.
+    speed = 1.0
+
+    def rate(self, rising: bool) -> float:
+        """Return d1 [1/s] while the heat rises or falls."""
+        return self.speed / max(self.time_constant, 1e-3)
+
+    def __init__(self, surroundings=None, **values):
+        super().__init__(surroundings, **values)
+        self.start()
+
+    def start(self):
+        """Forget the past: no heat."""
+        self._heat = None
+        self._phase = None
+
+    def step(self, value, step, phase, surroundings):
+        """Advance Eq. 1 by `step` [s] towards `value`."""
+        if self._heat is None:
+            # A trial starts cold: without drive where the drive heats, else where the drive is.
+            self._heat = 0.0 if surroundings.drive in ELECTRIC_DRIVES else value
+        if step > 0.0:
+            decay = math.exp(-self.rate(value > self._heat) * step)
+            self._heat = value + (self._heat - value) * decay
+        return self._heat
+
+    def inverse(self, signal, inputs, surroundings):
+        """Return the input that brings the heat to `signal` within the time of one step."""
+        if self._heat is None or not 0.0 < inputs.step < math.inf:
+            return signal
+        decay = math.exp(-self.rate(signal > self._heat) * inputs.step)
+        return (signal - self._heat * decay) / max(1.0 - decay, 1e-3)
+
+
+class ThermalLag(FirstOrderLag):
+    """The wire takes time to heat and to cool."""
+
+    id = 'thermal_lag'
+    sentence = 'The wire needs time to warm up and to cool down: the voltage is ahead of the heat.'
+    equation = 'd(Vs^2)/dt = d1 (V^2 - Vs^2), time constant 1/d1'
+    source = 'Eq. 1 of the paper (time constant about 5 s)'
+    shows_in = 'time since a step, dV/dt'
+    experiment = 'fast steps, and the same ramp at several rates'
+    confused_with = ('latency', 'viscous_friction', 'creep')
+    parameters = (
+        Parameter('time_constant', 's', 'time constant 1/d1 of Eq. 1', 1.0, 10.0, 0.0,
+                  (1.5, 6.0), log=True),)
+
+
+class HeatingCoolingAsymmetry(FirstOrderLag):
+    """Heating and cooling have time constants of their own."""
+
+    id = 'heating_cooling_asymmetry'
+    sentence = 'The wire warms up at another rate than it cools down.'
+    equation = 'as thermal_lag, with d1 (heating) = ratio * d1 (cooling)'
+    source = 'Eq. 1 with d1 by direction (convection differs with the temperature)'
+    shows_in = 'sign of dV/dt'
+    experiment = 'steps up and down to the same voltage'
+    confused_with = ('thermal_lag',)
+    replaces = ('thermal_lag',)
+    parameters = (
+        Parameter('time_constant', 's', 'time constant while cooling', 1.0, 10.0, 0.0, (2.0, 5.0),
+                  log=True),
+        Parameter('ratio', '1', 'rate of heating over rate of cooling', 0.5, 2.0, 1.0, (0.7, 1.4),
+                  log=True),)
+
+    def rate(self, rising):
+        """Return d1 [1/s] by direction."""
+        return super().rate(rising) * (self.ratio if rising else 1.0)
+
+
+class LatentHeat(FirstOrderLag):
+    """Transforming takes up and gives off heat."""
+
+    id = 'latent_heat'
+    sentence = 'While the wire transforms, the latent heat slows its temperature down.'
+    equation = 'dq/dt = d1 (V^2 - q) + h dxi/dt, xi the martensite share'
+    source = 'heat balance with the enthalpy of transformation, about 24 kJ/kg'
+    shows_in = 'slow parts inside the loop only'
+    experiment = 'small steps in and out of the loop'
+    confused_with = ('thermal_lag',)
+    replaces = ('thermal_lag',)
+    needs_phase = True
+    parameters = (
+        Parameter('time_constant', 's', 'time constant 1/d1 outside the transformation', 1.0, 10.0,
+                  0.0, (2.0, 5.0), log=True),
+        Parameter('latent', '1', 'latent heat over the heat stored at full drive', 0.05, 1.0, 0.0,
+                  (0.2, 0.5), log=True),)
+
+    def step(self, value, step, phase, surroundings):
+        """Advance with what the change of phase gives off."""
+        previous, self._phase = self._phase, phase
+        heat = super().step(value, step, phase, surroundings)
+        if previous is not None and math.isfinite(phase) and math.isfinite(previous):
+            self._heat = heat + self.latent * surroundings.heat * (phase - previous)
+        return self._heat
+
+
+class AmbientTemperature(ThermalEffect):
+    """The recorded ambient temperature shifts the wire's own."""
+
+    id = 'ambient_temperature'
+    sentence = 'Warm air heats the wire as the drive does: the recorded ambient temperature counts.'
+    equation = 'Vs^2 = V^2 + (d1/d2) (Ta - T0)'
+    source = 'Eq. 2 of the paper with a variable T0'
+    shows_in = 'the recorded ambient temperature'
+    experiment = 'log the ambient temperature on a cold and on a warm day'
+    confused_with = ('ambient_drift',)
+    needs_column = 'ambient_temperature'
+    parameters = (
+        Parameter('gain', 'V^2/K', 'd1/d2: heat that one kelvin stands for', 0.02, 2.0, 0.0,
+                  (0.2, 0.6), log=True),
+        Parameter('reference', 'degC', 'ambient temperature T0 of the bench', 5.0, 40.0, 25.0,
+                  (23.0,)),)
+
+    def forward(self, signal, inputs, surroundings):
+        """Add the heat of the warmer or colder air; nothing where it was not recorded."""
+        warmer = np.where(np.isfinite(inputs.ambient), inputs.ambient - self.reference, 0.0)
+        return signal + self.gain * warmer
+
+    def inverse(self, signal, inputs, surroundings):
+        """Drive less in warm air."""
+        if not math.isfinite(inputs.ambient):
+            return signal
+        return signal - self.gain * (inputs.ambient - self.reference)
+
+
+class AmbientDrift(ThermalEffect):
+    """The ambient temperature changes slowly and nobody recorded it."""
+
+    id = 'ambient_drift'
+    sentence = 'The room slowly gets warmer or colder during the recording.'
+    equation = 'Vs^2 = V^2 + a + b (t/t1) + c (t/t1)^2, t the time of day, t1 = 10 min'
+    source = 'Eq. 2 of the paper with T0 a slow function of time'
+    shows_in = 'time of day'
+    experiment = 'repeat the same loop every few minutes, or log the ambient temperature'
+    confused_with = ('fatigue', 'creep')
+    invertible = False
+    parameters = (
+        Parameter('offset', 'V^2', 'heat of the air at the start against the bench', 0.0, 20.0,
+                  0.0, (0.0,), both_signs=True),
+        Parameter('rate', 'V^2/10 min', 'change of that heat', 0.05, 20.0, 0.0, (-1.0, 1.0),
+                  both_signs=True),
+        Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.0, 20.0, 0.0, (0.0,),
+                  both_signs=True),)
+
+    CLOCK_UNIT = 600.0
+
+    def forward(self, signal, inputs, surroundings):
+        """Add a slow function of the time since the recording began."""
+        t = inputs.clock / self.CLOCK_UNIT
+        return signal + self.offset + self.rate * t + self.curvature * t * t
+
+
+class Airflow(ThermalEffect):
+    """A fan or a draught changes how well the wire is cooled."""
+
+    id = 'airflow'
+    sentence = 'More or less air over the wire changes what a voltage heats, and how fast.'
+    equation = 'd1 -> beta d1: Vs^2 = V^2 / beta'
+    source = 'Eq. 1 of the paper: d1 is proportional to the heat transfer coefficient'
+    shows_in = 'V, and the time constant'
+    experiment = 'switch the fan and watch gain and time constant change together'
+    confused_with = ('supply_sag',)
+    parameters = (
+        Parameter('beta', '1', 'heat transfer over that of the bench', 0.5, 3.0, 1.0, (0.8, 1.3),
+                  log=True),)
+
+    def forward(self, signal, inputs, surroundings):
+        """Divide the heat by the better cooling."""
+        return signal / self.beta
+
+    def inverse(self, signal, inputs, surroundings):
+        """Multiply it again."""
+        return signal * self.beta

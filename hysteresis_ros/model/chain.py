@@ -1,0 +1,140 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The stages between drive and sensor, put together from the effects of a model.
+
+An effect is applied in the order of its stage; one whose equation contains another's (a lag with
+two time constants contains one with a single time constant) takes its place.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hysteresis_ros.effects import (
+    DriveEffect, Effect, Inputs, MaterialEffect, MechanismEffect, SensorEffect, Surroundings,
+    catalogue)
+from hysteresis_ros.effects.base import STAGES
+from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
+
+
+def in_order(effects: Sequence[Effect]) -> list[Effect]:
+    """Return the effects in the order of their stages, without those that another replaces."""
+    replaced = {name for effect in effects for name in effect.replaces}
+    known = list(catalogue())
+    kept = [effect for effect in effects if effect.id not in replaced]
+    return sorted(kept, key=lambda effect: (STAGES.index(effect.stage), known.index(effect.id)
+                                            if effect.id in known else len(known)))
+
+
+class Chain:
+    """
+    The effects of a model by stage.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        In any order.
+    surroundings : Surroundings
+        Scales of the muscle.
+    """
+
+    def __init__(self, effects: Sequence[Effect], surroundings: Surroundings):
+        ordered = in_order(effects)
+        self.surroundings = surroundings
+        # Voltage and current heat with their square (Eq. 2).
+        self.squared = surroundings.drive in ELECTRIC_DRIVES
+        drive = [effect for effect in ordered if isinstance(effect, DriveEffect)]
+        self.electrical = [effect for effect in drive if effect.stage == 'electrical']
+        self.thermal = [effect for effect in drive if effect.stage == 'thermal']
+        self.material = [e for e in ordered if isinstance(e, MaterialEffect)]
+        self.mechanism = [e for e in ordered if isinstance(e, MechanismEffect)]
+        self.sensor = [e for e in ordered if isinstance(e, SensorEffect)]
+        self.needs_phase = any(effect.needs_phase for effect in drive)
+        # A fan changes gain and time constant together (d1 stands in both).
+        for lag in self.thermal:
+            if hasattr(lag, 'speed'):
+                lag.speed = float(np.prod([getattr(effect, 'beta', 1.0)
+                                           for effect in self.thermal]))
+
+    def to_heat(self, drive):
+        """Return what the drive heats with: its square, with the sign kept, or itself."""
+        return drive * np.abs(drive) if self.squared else drive
+
+    def to_drive(self, heat):
+        """Return the drive that stands for a heat: the steady-state voltage of Eq. 2."""
+        return np.sign(heat) * np.sqrt(np.abs(heat)) if self.squared else heat
+
+    def heat(self, drive: np.ndarray, inputs: Inputs) -> np.ndarray:
+        """Return the heat that the muscle feels in each row of one trial, shape (rows,)."""
+        signal = drive
+        for effect in self.electrical:
+            signal = effect.forward(signal, inputs, self.surroundings)
+        signal = self.to_heat(signal)
+        for effect in self.thermal:
+            signal = effect.forward(signal, inputs, self.surroundings)
+        return signal
+
+    def start(self) -> None:
+        """Make the stages with memory forget it."""
+        for effect in self.electrical + self.thermal + self.sensor:
+            effect.start()
+
+    def step(self, drive: float, inputs: Inputs) -> float:
+        """Return the heat after one sample of the drive, for a model that runs along."""
+        signal = drive
+        for effect in self.electrical:
+            signal = self._advance(effect, signal, inputs)
+        signal = float(self.to_heat(signal))
+        for effect in self.thermal:
+            signal = self._advance(effect, signal, inputs)
+        return signal
+
+    def _advance(self, effect: DriveEffect, signal: float, inputs: Inputs) -> float:
+        if type(effect).step is DriveEffect.step:
+            return float(effect.forward(signal, inputs, self.surroundings))
+        return effect.step(signal, inputs.step, inputs.phase, self.surroundings)
+
+    def inverse(self, heat: float, inputs: Inputs) -> float:
+        """Return the drive for a wanted heat, the stages taken in reverse."""
+        signal = heat
+        for effect in reversed(self.thermal):
+            signal = effect.inverse(signal, inputs, self.surroundings)
+        signal = float(self.to_drive(signal))
+        for effect in reversed(self.electrical):
+            signal = effect.inverse(signal, inputs, self.surroundings)
+        return float(signal)
+
+    def load_per_heat(self) -> float:
+        """Return C of `stress_dependence`, or 0 where the first stage is the model's own."""
+        return sum(getattr(effect, 'load_per_heat', 0.0) for effect in self.material)
+
+    def load_inside(self, load):
+        """Return the load as the transformation feels it."""
+        return load + sum(effect.shift_load(load, self.surroundings) for effect in self.material)
+
+    def scale(self, load):
+        """Return S(F), the factor on the transformation strain."""
+        factor = 1.0
+        for effect in self.material:
+            factor = factor * effect.scale(load, self.surroundings)
+        return factor
+
+    def stretch(self, load):
+        """Return e(F), the elongation by the load alone."""
+        return sum((effect.stretch(load, self.surroundings) for effect in self.material),
+                   0.0 * load)
+
+    def drift(self, drive, heat, inputs: Inputs) -> tuple[np.ndarray, np.ndarray]:
+        """Return offset and factor of each row, each shape (rows,)."""
+        offset, factor = np.zeros(len(drive)), np.ones(len(drive))
+        for effect in self.material:
+            added, times = effect.drift(drive, heat, inputs, self.surroundings)
+            offset, factor = offset + added, factor * times
+        return offset, factor
+
+    def measured(self, response: np.ndarray, inputs: Inputs) -> np.ndarray:
+        """Return what the sensor says of the true response of one trial, shape (rows,)."""
+        for effect in self.sensor:
+            response = effect.forward(response, inputs)
+        return response

@@ -1,0 +1,129 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The model file: one YAML mapping, read by safe load only."""
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import yaml
+
+from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.effects import effect_class
+from hysteresis_ros.errors import HysteresisError, ModelFileError
+from hysteresis_ros.model.linear import LinearModel
+from hysteresis_ros.model.muscle import MuscleModel
+from hysteresis_ros.operators import operator_from_dict
+
+SCHEMA = 1
+
+
+def to_dict(model: MuscleModel) -> dict:
+    """Return the model as plain types, in the order in which a person reads it."""
+    content = {
+        'schema': SCHEMA, 'kind': model.kind,
+        'drive': model.drive, 'load': model.load_name, 'response': model.response,
+        'sign': model.sign, 'mean_load': float(model.mean_load),
+        'metrics': model.metrics,
+        'effects': [effect.to_dict() for effect in model.effects],
+        'geometry': model.geometry.to_mapping() if model.geometry else None,
+        'ranges': {name: [float(low), float(high)]
+                   for name, (low, high) in model.ranges.items()},
+        'linear': model.linear.to_dict() if model.linear else None,
+        'force_stage': model.force_stage.to_dict() if model.force_stage else None,
+        'length_stage': model.length_stage.to_dict() if model.length_stage else None,
+        'provenance': model.provenance,
+    }
+    return content
+
+
+def save(model: MuscleModel, path) -> None:
+    """
+    Write the model; an existing file is replaced only by a complete one.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    text = '# Model of a muscle with hysteresis, written by hysteresis_ros.\n' + yaml.safe_dump(
+        to_dict(model), sort_keys=False, default_flow_style=None, width=100)
+    partial = path.with_name(path.name + '.part')
+    partial.write_text(text, encoding='utf-8')
+    os.replace(partial, path)
+
+
+def load(path) -> MuscleModel:
+    """
+    Read a model file.
+
+    Raises
+    ------
+    ModelFileError
+        If it is no model file, is damaged, or is of another schema version.
+    OSError
+        If it cannot be read.
+    """
+    try:
+        text = Path(path).read_text(encoding='utf-8')
+        loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+        content = yaml.load(text, Loader=loader)
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        first = ' '.join(str(error).split())
+        raise ModelFileError(f'{path}: not a model file ({first[:120]})') from None
+    if not isinstance(content, Mapping) or 'schema' not in content:
+        raise ModelFileError(f'{path}: not a model file; `hysteresis identify` writes one')
+    if content['schema'] != SCHEMA:
+        raise ModelFileError(f'{path}: model file of schema {content["schema"]!r}, this version '
+                             f'reads {SCHEMA}; identify the model again')
+    try:
+        return from_dict(content)
+    except KeyError as error:
+        raise ModelFileError(f'{path}: the model file lacks {error}') from None
+    except HysteresisError as error:
+        raise ModelFileError(f'{path}: {error}') from None
+    except (TypeError, ValueError, AttributeError) as error:
+        raise ModelFileError(f'{path}: damaged model file ({error})') from None
+
+
+def from_dict(content: Mapping) -> MuscleModel:
+    """Build the model from what `to_dict` returned."""
+    ranges = {str(name): (_number(low, name), _number(high, name))
+              for name, (low, high) in content['ranges'].items()}
+    if content['sign'] not in (-1, 1):
+        raise ModelFileError(f'sign must be -1 or 1, not {content["sign"]!r}')
+    model = MuscleModel(
+        kind=str(content['kind']), drive=str(content['drive']),
+        load_name=None if content['load'] is None else str(content['load']),
+        response=str(content['response']),
+        length_stage=_operator(content['length_stage']),
+        force_stage=_operator(content['force_stage']),
+        sign=content['sign'],
+        linear=LinearModel.from_dict(content['linear']) if content['linear'] else None,
+        geometry=(BicepGeometry.from_mapping(content['geometry'], 'model file')
+                  if content['geometry'] else None),
+        ranges=ranges, mean_load=_number(content['mean_load'], 'mean_load'),
+        metrics=dict(content['metrics']), provenance=dict(content['provenance']))
+    model.effects = [_effect(entry, model.surroundings) for entry in content['effects']]
+    return model
+
+
+def _operator(content):
+    return None if content is None else operator_from_dict(content)
+
+
+def _effect(entry: Mapping, surroundings):
+    parameters = entry['parameters']
+    effect = effect_class(entry['id'])(surroundings, **{
+        name: _number(parameter['value'], name) for name, parameter in parameters.items()})
+    effect.intervals = {name: (_number(parameter['low'], name), _number(parameter['high'], name))
+                        for name, parameter in parameters.items()}
+    return effect
+
+
+def _number(value, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ModelFileError(f'{name} is {value!r}, it has to be a finite number')
+    return float(value)

@@ -1,0 +1,230 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The identified model of a muscle: operators, linear model, effects, geometry, provenance."""
+
+import copy
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.effects import Effect, Surroundings
+from hysteresis_ros.errors import ModelFileError, ParameterError
+from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.linear import LinearModel
+from hysteresis_ros.operators import HysteresisOperator
+
+# A wire cold enough to be fully martensite is one without drive.
+COLD_DRIVE = {'voltage': 0.0, 'current': 0.0, 'pressure': 0.0, 'power': 0.0}
+
+
+@dataclasses.dataclass
+class MuscleModel:
+    """
+    A muscle as ``F = H1[V]`` and ``L = H2[F - H1[V]]`` (Eqs. 6 and 7), with effects.
+
+    Parameters
+    ----------
+    kind : str
+        'two-stage', or 'preisach' for one operator of the drive; other operators keep the kind.
+    drive, load_name, response : str
+        What was applied, what loaded the muscle ('' or None for nothing), what was measured.
+    length_stage : HysteresisOperator
+        H2 with an output that rises with its input ``u = sign (x - F)``.
+    force_stage : HysteresisOperator, optional
+        H1. Without it x is the drive itself and the load does not count.
+    sign : int
+        -1 for a muscle that contracts when driven, 1 for one that extends.
+    linear : LinearModel, optional
+        The paper's comparison.
+    effects : list of Effect
+        What was added by `extend`.
+    geometry : BicepGeometry, optional
+        The arm it drives.
+    ranges : dict of str to (float, float)
+        What was seen of drive, load and response.
+    mean_load : float
+        Mean load of the bench's length table.
+    metrics, provenance : dict
+        Errors of the identification, and where the model came from.
+    """
+
+    kind: str
+    drive: str
+    load_name: str | None
+    response: str
+    length_stage: HysteresisOperator | None
+    force_stage: HysteresisOperator | None = None
+    sign: int = -1
+    linear: LinearModel | None = None
+    effects: list = dataclasses.field(default_factory=list)
+    geometry: BicepGeometry | None = None
+    ranges: dict = dataclasses.field(default_factory=dict)
+    mean_load: float = 0.0
+    metrics: dict = dataclasses.field(default_factory=dict)
+    provenance: dict = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def load(cls, path) -> 'MuscleModel':
+        """Read a model file; see `hysteresis_ros.model.files.load`."""
+        from hysteresis_ros.model import files
+        return files.load(path)
+
+    def save(self, path) -> None:
+        """Write a model file; see `hysteresis_ros.model.files.save`."""
+        from hysteresis_ros.model import files
+        files.save(self, path)
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """Scales of the muscle that effects refer to."""
+        low, high = self.ranges.get(self.response, (0.0, 1.0))
+        span = max(high - low, 1e-12)
+        if self.response == 'strain':
+            length = 1.0
+        elif self.geometry is not None:
+            length = self.geometry.resting_length
+        else:
+            # A muscle's stroke is about a twentieth of its length.
+            length = 20.0 * span
+        largest = max(abs(value) for value in self.ranges.get(self.drive, (0.0, 1.0)))
+        heat = float(Chain([], Surroundings(1.0, 1.0, 1.0, 1.0, self.drive)).to_heat(largest))
+        return Surroundings(length, self.mean_load, heat, span, self.drive, self.load_name,
+                            self.response)
+
+    def with_effects(self, effects: Sequence[Effect]) -> 'MuscleModel':
+        """Return a copy with other effects and the same operators."""
+        return dataclasses.replace(self, effects=list(effects))
+
+    def chain(self) -> Chain:
+        """Return the stages with the model's effects."""
+        return Chain(self.effects, self.surroundings)
+
+    def first_stage(self, chain: Chain) -> 'FirstStage':
+        """Return the map from heat to x, with a memory of its own."""
+        return FirstStage(self, chain)
+
+    @property
+    def cold_drive(self) -> float:
+        """The drive of the cold state that every trial starts from."""
+        if self.drive in COLD_DRIVE:
+            return COLD_DRIVE[self.drive]
+        return self.ranges.get(self.drive, (0.0, 0.0))[0]
+
+    def predict(self, measurement, method: str = 'preisach') -> np.ndarray:
+        """
+        Simulate the response of every row from the inputs alone.
+
+        Parameters
+        ----------
+        measurement : Measurement
+            Bench table or arm run; its response column is not looked at.
+        method : {'preisach', 'linear'}
+            The hysteresis model with its effects, or the paper's linear model.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            Force [N], length [m], strain or angle [rad].
+
+        Raises
+        ------
+        ParameterError
+            If the model lacks what this kind of measurement needs.
+        """
+        from hysteresis_ros.model import simulation
+        if method == 'linear':
+            return simulation.predict_linear(self, measurement)
+        if method != 'preisach':
+            raise ParameterError(f'method must be preisach or linear, not {method!r}')
+        return simulation.predict(self, measurement)
+
+    def controller(self, **options):
+        """Return the inverse with memory; see `Controller`."""
+        from hysteresis_ros.model.controller import Controller
+        return Controller(self, **options)
+
+    def observer(self):
+        """Return the forward model that runs along with a recording; see `Observer`."""
+        from hysteresis_ros.model.observer import Observer
+        return Observer(self)
+
+    def require_geometry(self) -> BicepGeometry:
+        """Return the arm's geometry, or say that the model has none."""
+        if self.geometry is None:
+            raise ParameterError(
+                'the model has no arm geometry; identify it with --geometry geometry.yaml')
+        return self.geometry
+
+    def require_length_stage(self) -> HysteresisOperator:
+        """Return a copy of H2 with its memory wiped, or say that the model has none."""
+        if self.length_stage is None:
+            raise ModelFileError(
+                'the model has no length stage; identify it with a length table')
+        operator = copy.deepcopy(self.length_stage)
+        operator.reset()
+        return operator
+
+
+class FirstStage:
+    """
+    From the heat that the muscle feels to x, in the unit of the load.
+
+    In the paper's model x = H1[V]. With `stress_dependence` on the bench x = C V^2 takes its place,
+    because temperature, not blocked force, is then what the load is weighed against. A model
+    without a first stage takes the drive as it is.
+    """
+
+    def __init__(self, model: MuscleModel, chain: Chain):
+        self._chain = chain
+        self.load_per_heat = chain.load_per_heat()
+        self.loaded = self.load_per_heat > 0.0 or model.force_stage is not None
+        self._operator = None
+        if self.load_per_heat == 0.0 and model.force_stage is not None:
+            self._operator = copy.deepcopy(model.force_stage)
+            self._operator.reset()
+
+    def reset(self) -> None:
+        """Wipe the memory."""
+        if self._operator is not None:
+            self._operator.reset()
+
+    def save(self) -> dict:
+        """Return the memory."""
+        return self._operator.save() if self._operator is not None else {}
+
+    def restore(self, state: dict) -> None:
+        """Take a saved memory back."""
+        if self._operator is not None:
+            self._operator.restore(state)
+
+    def simulate(self, heat: np.ndarray) -> np.ndarray:
+        """Return x for the heat of consecutive rows, shape (rows,)."""
+        if self.load_per_heat > 0.0:
+            return self.load_per_heat * heat
+        drive = self._chain.to_drive(heat)
+        return self._operator.simulate(drive) if self._operator is not None else drive
+
+    def step(self, heat: float) -> float:
+        """Commit one sample."""
+        if self.load_per_heat > 0.0:
+            return self.load_per_heat * heat
+        drive = float(self._chain.to_drive(heat))
+        return self._operator.step(drive) if self._operator is not None else drive
+
+    def invert(self, x: float, dead_band: float = 0.0) -> tuple[float, float, bool]:
+        """Return the heat for x, what x it really gives, and whether it is saturated."""
+        if self.load_per_heat > 0.0:
+            return x / self.load_per_heat, x, False
+        if self._operator is None:
+            return float(self._chain.to_heat(x)), x, False
+        found = self._operator.invert(x, dead_band=dead_band)
+        return float(self._chain.to_heat(found.input)), found.output, found.saturated
+
+    def peek(self, heat: float) -> float:
+        """Return x without committing."""
+        if self.load_per_heat > 0.0:
+            return self.load_per_heat * heat
+        drive = float(self._chain.to_drive(heat))
+        return self._operator.peek(drive) if self._operator is not None else drive

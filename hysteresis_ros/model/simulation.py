@@ -1,0 +1,228 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Simulation of a whole measurement from its inputs alone, trial by trial."""
+
+import dataclasses
+
+import numpy as np
+
+from hysteresis_ros.bicep.balance import ArmBalance
+from hysteresis_ros.effects import Inputs
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.model.chain import Chain
+
+# Rows of a settled table without times are this far apart [s] (Sec. III-A).
+HOLD = 30.0
+# Passes that bring an effect that depends on the phase into agreement with the phase it causes.
+PHASE_PASSES = 2
+
+
+@dataclasses.dataclass
+class Trial:
+    """One trial's inputs: rows of the table, drive and load of shape (rows,), and the rest."""
+
+    rows: slice
+    drive: np.ndarray
+    load: np.ndarray
+    inputs: Inputs
+
+
+def trials_of(model, measurement) -> list[Trial]:
+    """
+    Split a measurement into trials with the inputs that effects may look at.
+
+    Parameters
+    ----------
+    model : MuscleModel
+        For the scale on which cycles are counted.
+    measurement : Measurement
+        Bench table or arm run.
+
+    Returns
+    -------
+    list of Trial
+    """
+    drive = measurement.column(model.drive)
+    load = (measurement.columns.get(model.load_name) if model.load_name else None)
+    if load is None:
+        load = np.zeros(measurement.rows)
+    ambient = measurement.columns.get('ambient_temperature')
+    low, high = model.ranges.get(model.drive, (0.0, 1.0))
+    trials, clock, travel = [], 0.0, 0.0
+    for _, rows in measurement.split():
+        values = drive[rows]
+        count = len(values)
+        if measurement.time is None:
+            time = HOLD * np.arange(1, count + 1)
+        else:
+            time = measurement.time[rows]
+        step = np.diff(time, prepend=0.0)
+        travelled = travel + np.cumsum(np.abs(np.diff(values, prepend=model.cold_drive)))
+        inputs = Inputs(
+            time=time, clock=clock + time, step=step,
+            ambient=ambient[rows] if ambient is not None else np.full(count, np.nan),
+            phase=np.full(count, np.nan), cycles=travelled / (2.0 * max(high - low, 1e-12)))
+        trials.append(Trial(rows, values, load[rows], inputs))
+        clock += float(time[-1])
+        travel = float(travelled[-1])
+    return trials
+
+
+class Simulator:
+    """
+    The model run over one measurement, for many sets of effects.
+
+    Parameters
+    ----------
+    model : MuscleModel
+        Operators, geometry and scales; its effects are not looked at.
+    measurement : Measurement
+        Whose inputs are simulated.
+    stride : int
+        In a continuous arm run only every `stride`-th row is balanced, and every row at which
+        the first stage turns round, so that the memory stays exact; rows between are interpolated.
+    """
+
+    def __init__(self, model, measurement, stride: int = 1):
+        self.model = model
+        self.measurement = measurement
+        self.stride = 1 if measurement.settled else stride
+        self.trials = trials_of(model, measurement)
+
+    def run(self, effects) -> np.ndarray:
+        """
+        Simulate with these effects.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            The response as the sensor would give it.
+        """
+        model = self.model
+        chain = Chain(effects, model.surroundings)
+        result = np.empty(self.measurement.rows)
+        respond = self._responder(chain, effects)
+        for trial in self.trials:
+            inputs = trial.inputs
+            if chain.needs_phase:
+                inputs = inputs._replace(phase=np.ones(len(trial.drive)))
+            response = respond(trial, inputs)
+            for _ in range(PHASE_PASSES if chain.needs_phase else 0):
+                inputs = inputs._replace(phase=self._phase(response))
+                response = respond(trial, inputs)
+            result[trial.rows] = chain.measured(response, inputs)
+        return result
+
+    def _phase(self, response):
+        """Martensite share as the response shows it: long is martensite."""
+        length = response
+        if self.measurement.response == 'angle':
+            length = self.model.geometry.length(response)
+        low, high = self.model.length_stage.output_range
+        return np.clip((length - low) / max(high - low, 1e-12), 0.0, 1.0)
+
+    def _responder(self, chain, effects):
+        response = self.measurement.response
+        if response == 'force':
+            return lambda trial, inputs: self._force(chain, trial, inputs)
+        stage = self.model.require_length_stage()
+        if response == 'angle':
+            if self.model.sign > 0:
+                raise ParameterError('the model is of a muscle that extends when driven; the '
+                                     'bicep needs one that contracts')
+            offsets = next((e.offsets for e in effects if hasattr(e, 'offsets')), (0.0,))
+            balance = ArmBalance(stage, self.model.require_geometry(), chain, offsets)
+            return lambda trial, inputs: self._angle(chain, balance, trial, inputs)
+        return lambda trial, inputs: self._length(chain, stage, trial, inputs)
+
+    def _first(self, chain, trial, inputs):
+        """Cold x, x of each row, and heat of each row."""
+        first = self.model.first_stage(chain)
+        heat = chain.heat(trial.drive, inputs)
+        cold = chain.to_heat(self.model.cold_drive)
+        x = first.simulate(np.concatenate(([cold], heat)))
+        return x[0], x[1:], heat, first.loaded
+
+    def _force(self, chain, trial, inputs):
+        if self.model.force_stage is None:
+            raise ParameterError('the model has no force stage; identify it with --force F.csv')
+        drive = chain.to_drive(chain.heat(trial.drive, inputs))
+        operator = self.model.force_stage
+        operator.reset()
+        operator.step(self.model.cold_drive)
+        return operator.simulate(drive)
+
+    def _length(self, chain, stage, trial, inputs):
+        model = self.model
+        cold, x, heat, loaded = self._first(chain, trial, inputs)
+        load = chain.load_inside(trial.load) if loaded else 0.0 * trial.load
+        stage.reset()
+        stage.step(model.sign * (cold - load[0]))
+        output = stage.simulate(model.sign * (x - load))
+        base = stage.output_range[0]
+        offset, factor = chain.drift(trial.drive, heat, inputs)
+        return (base + chain.scale(trial.load) * factor * (output - base)
+                + chain.stretch(trial.load) + offset)
+
+    def _angle(self, chain, balance, trial, inputs):
+        cold, x, heat, _ = self._first(chain, trial, inputs)
+        offset, factor = chain.drift(trial.drive, heat, inputs)
+        chosen = self._chosen_rows(x, offset)
+        times = inputs.time[chosen]
+        steps = np.diff(times, prepend=0.0).tolist()
+        balance.start()
+        balance.settle(float(cold))
+        advance = balance.step
+        angles = [advance(*row) for row in zip(
+            x[chosen].tolist(), steps, offset[chosen].tolist(), factor[chosen].tolist())]
+        if len(chosen) == len(x):
+            return np.array(angles)
+        return np.interp(inputs.time, times, angles)
+
+    def _chosen_rows(self, x, offset):
+        rows = np.arange(len(x))
+        if self.stride == 1:
+            return rows
+        keep = rows % self.stride == 0
+        change = np.diff(x)
+        turn = np.flatnonzero(change[1:] * change[:-1] <= 0.0) + 1
+        moving = (change[turn] != 0.0) | (change[turn - 1] != 0.0)
+        keep[turn[moving]] = True
+        keep[[0, -1]] = True
+        return rows[keep]
+
+
+def predict(model, measurement) -> np.ndarray:
+    """Simulate every row of a measurement with the model and its effects, shape (rows,)."""
+    return Simulator(model, measurement).run(model.effects)
+
+
+def predict_linear(model, measurement) -> np.ndarray:
+    """
+    Predict every row with the linear model (Eq. 11), shape (rows,).
+
+    For an arm run the angle is that at which ``L(theta) = k2 (F(theta) - k1 V - F0)``.
+
+    Raises
+    ------
+    ParameterError
+        If the model has no linear model, or no geometry for an arm run.
+    """
+    if model.linear is None:
+        raise ParameterError('the model has no linear model')
+    drive = measurement.column(model.drive)
+    if measurement.response == 'force':
+        return model.linear.force(drive)
+    if measurement.response != 'angle':
+        load = measurement.columns.get(model.load_name) if model.load_name else None
+        return model.linear.length(drive, np.zeros(len(drive)) if load is None else load)
+    geometry = model.require_geometry()
+    theta = np.linspace(*geometry.angle_range, 2000)
+    needed = model.linear.drive_for_length(geometry.length(theta), geometry.force(theta))
+    # The drive falls with the angle; where the load's slope would turn that round, stay.
+    needed = np.minimum.accumulate(needed)
+    return np.interp(-drive, -needed, theta)
