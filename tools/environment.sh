@@ -44,7 +44,8 @@ install() {
 }
 # colcon still calls `setup.py install`, which setuptools 80 gave up; colcon-core bounds it, too.
 install 'setuptools<80'
+colcon='colcon-core colcon-ros colcon-output colcon-package-information colcon-package-selection
+    colcon-bash colcon-zsh'
 # The words are requirements, none of which holds a space.
-# shellcheck disable=SC2046
-install colcon-core colcon-ros colcon-bash colcon-zsh \
-    $("$folder/bin/python" tools/requirements.py "$extras")
+# shellcheck disable=SC2046,SC2086
+install wheel $colcon $("$folder/bin/python" tools/requirements.py "$extras")

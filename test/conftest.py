@@ -1,0 +1,66 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What all tests share: reproducible examples, quiet discovery, the checkout and its build."""
+
+import fcntl
+import os
+from pathlib import Path
+import subprocess
+import sys
+import tempfile
+
+import hypothesis
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+# Tests of other runs on the same network must not be heard; rclpy reads this at its start.
+os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+
+# Slow machines are no failures, and every run tries the same examples.
+hypothesis.settings.register_profile('suite', deadline=None, derandomize=True, database=None)
+hypothesis.settings.load_profile('suite')
+
+
+@pytest.fixture(scope='session')
+def root():
+    """Return the top folder of the checkout."""
+    return ROOT
+
+
+@pytest.fixture
+def domain_id(monkeypatch):
+    """Reserve a ROS domain that no other test on this machine uses, here and in children."""
+    for number in range(1, 102):    # above 101, its ports are those of outgoing connections
+        name = Path(tempfile.gettempdir(), f'hysteresis_ros_domain_{number}')
+        with open(name, 'w', encoding='ascii') as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            monkeypatch.setenv('ROS_DOMAIN_ID', str(number))
+            yield number
+            return
+    pytest.fail('all ROS domains from 1 to 101 are taken')
+
+
+@pytest.fixture(scope='session')
+def prefix(tmp_path_factory):
+    """Return the package's prefix in a built workspace: that of make, else one built here."""
+    given = os.environ.get('HYSTERESIS_ROS_PREFIX')
+    if given:
+        return Path(given)
+    workspace = tmp_path_factory.mktemp('workspace')
+    colcon(workspace, 'build', '--base-paths', str(ROOT), '--build-base', str(workspace / 'build'),
+           '--install-base', str(workspace / 'install'))
+    return workspace / 'install' / 'hysteresis_ros'
+
+
+def colcon(workspace, *arguments):
+    """Run colcon on this interpreter and return what it prints; its log goes to `workspace`."""
+    code = 'import sys; from colcon_core.command import main; sys.exit(main())'
+    done = subprocess.run(
+        [sys.executable, '-c', code, '--log-base', str(workspace / 'log'), *arguments],
+        capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
