@@ -1,0 +1,46 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Measurements: one table type, read from CSV files or rosbag2 recordings."""
+
+from pathlib import Path
+
+from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.measurements.bag import is_bag, read_bag
+from hysteresis_ros.measurements.csv import read_csv, write_csv
+from hysteresis_ros.measurements.quantities import QUANTITIES, Quantity
+from hysteresis_ros.measurements.table import (
+    Measurement, MeasurementWarning, settled_rows, SETTLED_HOLD)
+
+__all__ = [
+    'Measurement', 'MeasurementWarning', 'QUANTITIES', 'Quantity', 'SETTLED_HOLD', 'read_bag',
+    'read_csv', 'read_measurement', 'settled_rows', 'write_csv']
+
+
+def read_measurement(path, namespace=None):
+    """
+    Read a CSV file or a rosbag2 recording.
+
+    Parameters
+    ----------
+    path : str or Path
+        A CSV file, a rosbag2 folder (mcap or sqlite3, plain or zstd), or one of its storage
+        files.
+    namespace : str, optional
+        Which arm to take from a bag that recorded several.
+
+    Returns
+    -------
+    Measurement
+
+    Raises
+    ------
+    MeasurementError
+        If the file is missing or is no measurement; the message says what to do.
+
+    """
+    path = Path(path)
+    if not path.exists():
+        raise MeasurementError(f'{path}: no such file or folder')
+    if is_bag(path):
+        return read_bag(path, namespace)
+    return read_csv(path)

@@ -1,0 +1,133 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Raw messages of a rosbag2 recording, through `rosbags` or, without it, ROS 2's own `rosbag2_py`.
+
+Both give (topic, receive time, bytes).
+"""
+
+from pathlib import Path
+
+from hysteresis_ros.errors import MeasurementError
+
+SUFFIXES = ('.mcap', '.db3')
+
+
+def open_bag(path):
+    """
+    Open a recording.
+
+    Parameters
+    ----------
+    path : Path
+        Folder, or one storage file.
+
+    Returns
+    -------
+    RosbagsStorage or Rosbag2Storage
+        A context manager with `topics`, a dict from topic to type, and `messages(topics)`.
+
+    Raises
+    ------
+    MeasurementError
+        If it is no bag, is damaged or empty, or neither reader is installed.
+
+    """
+    path = storage_of(Path(path))
+    try:
+        from rosbags.rosbag2 import Reader
+        return RosbagsStorage(path, Reader)
+    except ImportError:
+        pass
+    try:
+        from hysteresis_ros.measurements.bag_rosbag2 import Rosbag2Storage
+    except ImportError:
+        raise MeasurementError(
+            f'{path}: reading a bag needs the Python package rosbags (pip install rosbags) '
+            'or a sourced ROS 2 with rosbag2') from None
+    return Rosbag2Storage(path)
+
+
+def storage_of(path):
+    """
+    Return what to open: the folder, or its only storage file if the metadata is missing.
+
+    Raises
+    ------
+    MeasurementError
+        If there is nothing to open.
+
+    """
+    if path.is_file():
+        files, whole = [path], path
+    else:
+        files = sorted(p for p in path.iterdir() if p.name.removesuffix('.zstd').endswith(SUFFIXES))
+        whole = path
+        if not (path / 'metadata.yaml').exists():
+            if len(files) != 1:
+                raise MeasurementError(
+                    f'{path}: no metadata.yaml; the recorder did not end cleanly. Run: '
+                    'ros2 bag reindex FOLDER')
+            whole = files[0]
+    if not files:
+        raise MeasurementError(f'{path}: the folder holds no bag (*.mcap or *.db3)')
+    if all(file.stat().st_size == 0 for file in files):
+        raise MeasurementError(
+            f'{path}: the bag is empty (0 bytes); its recorder was killed before it wrote. '
+            'Record again and end the recorder with Ctrl-C')
+    return whole
+
+
+def damaged(path, error):
+    """Return the one-line error for a bag that a reader gave up on."""
+    text = ' '.join(str(error).split())[:160] or type(error).__name__
+    return MeasurementError(
+        f'{path}: the bag cannot be read, it is truncated or damaged ({text}). Try: '
+        'ros2 bag reindex FOLDER')
+
+
+class RosbagsStorage:
+    """A recording read by the package rosbags, without the message definitions inside it."""
+
+    def __init__(self, path, reader):
+        self.path = path
+        try:
+            self.reader = reader(path)
+            self.reader.open()
+        except Exception as error:
+            # Whatever a damaged file provokes in the library, to the user it is one thing.
+            raise damaged(path, error) from None
+        self.topics = {c.topic: c.msgtype for c in self.reader.connections}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self.reader.close()
+
+    def messages(self, topics):
+        """
+        Yield the messages of some topics in the order of the recording.
+
+        Parameters
+        ----------
+        topics : collection of str
+
+        Yields
+        ------
+        topic : str
+        received : int
+            ns.
+        data : bytes
+
+        """
+        wanted = [c for c in self.reader.connections if c.topic in topics]
+        if not wanted:
+            return
+        try:
+            for connection, received, data in self.reader.messages(wanted):
+                yield connection.topic, received, data
+        except GeneratorExit:
+            raise
+        except Exception as error:
+            raise damaged(self.path, error) from None

@@ -1,0 +1,85 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the columns of a measurement are called, their units, and values that look wrong."""
+
+from typing import NamedTuple
+
+DRIVES = ('voltage', 'temperature', 'pressure', 'current', 'power')
+LOADS = ('force', 'stress')
+RESPONSES = ('angle', 'length', 'strain', 'force')
+
+
+class Quantity(NamedTuple):
+    """
+    A physical quantity in SI units (temperatures in degrees Celsius).
+
+    Attributes
+    ----------
+    unit : str
+        Unit of the values in files.
+    shown_unit, shown_scale : str, float
+        Unit for people, and the factor from the file's unit to it.
+    least, most : float
+        The largest absolute value of a whole recording is expected between these; outside, a
+        factor of 1000 is likely. They are wide: they catch units, not unusual hardware.
+    small_unit, large_unit : str
+        What the values probably are when they are too large (a smaller unit was written) or
+        too small (a larger one was).
+
+    """
+
+    unit: str
+    shown_unit: str
+    shown_scale: float
+    least: float
+    most: float
+    small_unit: str
+    large_unit: str
+
+
+QUANTITIES = {
+    'voltage': Quantity('V', 'V', 1.0, 0.05, 500.0, 'mV', 'kV'),
+    'supply_voltage': Quantity('V', 'V', 1.0, 0.05, 500.0, 'mV', 'kV'),
+    'temperature': Quantity('degC', '°C', 1.0, 0.5, 2000.0, 'millidegrees', 'kilodegrees'),
+    'ambient_temperature': Quantity('degC', '°C', 1.0, 0.0, 150.0, 'kelvin or millidegrees', ''),
+    'pressure': Quantity('Pa', 'kPa', 1e-3, 1e3, 1e8, 'mPa', 'kPa, bar or MPa'),
+    'current': Quantity('A', 'A', 1.0, 1e-3, 500.0, 'mA', 'kA'),
+    'power': Quantity('W', 'W', 1.0, 1e-3, 2e4, 'mW', 'kW'),
+    'force': Quantity('N', 'N', 1.0, 0.05, 1000.0, 'mN', 'kN'),
+    'stress': Quantity('Pa', 'MPa', 1e-6, 5e4, 5e9, 'mPa', 'MPa or kPa'),
+    'length': Quantity('m', 'mm', 1e3, 1e-8, 1.0, 'mm', 'km'),
+    'strain': Quantity('', '%', 100.0, 1e-7, 1.0, 'percent or millistrain', ''),
+    'angle': Quantity('rad', 'deg', 57.29577951308232, 1e-5, 6.6, 'degrees or mrad', 'krad'),
+    'time': Quantity('s', 's', 1.0, 0.0, float('inf'), 'ms', ''),
+}
+
+
+def unit_of(name):
+    """
+    Return a column's unit in files, '' if it is not known.
+
+    A `predicted_` or `reference_` in front of the name does not change the unit.
+    """
+    for prefix in ('predicted_', 'reference_'):
+        name = name.removeprefix(prefix)
+    quantity = QUANTITIES.get(name)
+    return quantity.unit if quantity else ''
+
+
+def shown(name):
+    """
+    Return the unit for people and the factor to it.
+
+    Parameters
+    ----------
+    name : str
+        Name of a quantity; unknown ones have no unit and factor 1.
+
+    Returns
+    -------
+    unit : str
+    scale : float
+
+    """
+    quantity = QUANTITIES.get(name)
+    return (quantity.shown_unit, quantity.shown_scale) if quantity else ('', 1.0)

@@ -1,0 +1,172 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tables: what their columns make them, their trials, settled rows, and what they refuse."""
+
+import re
+
+from hypothesis import given, settings, strategies
+from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.measurements import Measurement, settled_rows
+from hysteresis_ros.measurements.quantities import shown, unit_of
+from hysteresis_ros.measurements.table import holds
+import numpy as np
+import pytest
+
+
+def arm(**changes):
+    columns = {'time': [0, 30, 60, 0, 30, 60], 'trial': [0, 0, 0, 3, 3, 3],
+               'voltage': [0, 1, 2, 0, 2, 1], 'angle': [1.0, 0.9, 0.8, 1.0, 0.8, 0.9]}
+    columns.update(changes)
+    return {name: values for name, values in columns.items() if values is not None}
+
+
+@pytest.mark.parametrize('names, kind, response, drive, load', [
+    ('trial step voltage force', 'bench', 'force', 'voltage', None),
+    ('trial step voltage force length', 'bench', 'length', 'voltage', 'force'),
+    ('time trial voltage angle', 'arm', 'angle', 'voltage', None),
+    ('trial step temperature stress strain', 'bench', 'strain', 'temperature', 'stress'),
+    ('time trial voltage length', 'bench', 'length', 'voltage', None),
+    ('step pressure length force', 'bench', 'length', 'pressure', 'force'),
+    ('step current force voltage', 'bench', 'force', 'voltage', None)])
+def test_columns_say_what_a_table_is(names, kind, response, drive, load):
+    values = {name: [0.0, 1.0] if name != 'trial' else [0, 0] for name in names.split()}
+    table = Measurement.from_columns(values)
+    assert (table.kind, table.response, table.drive, table.load) == (kind, response, drive, load)
+    assert table.rows == 2
+    assert list(table.trials) == [0]
+
+
+def test_trials_are_split_in_the_order_of_the_file():
+    table = Measurement.from_columns(arm(trial=[5, 5, 5, 2, 2, 2]))
+    assert list(table.trials) == [5, 2]
+    assert table.split() == [(5.0, slice(0, 3)), (2.0, slice(3, 6))]
+    chosen = table.select([2])
+    assert chosen.rows == 3
+    assert list(chosen.column('voltage')) == [0, 2, 1]
+    assert chosen.source == table.source
+
+
+def test_selecting_a_trial_that_is_not_there_names_those_that_are():
+    table = Measurement.from_columns(arm())
+    with pytest.raises(MeasurementError, match='no trial 7; the table has trials 0, 3'):
+        table.select([0, 7])
+
+
+def test_settled_needs_twenty_seconds_between_all_rows_of_a_trial():
+    assert Measurement.from_columns(arm()).settled
+    assert not Measurement.from_columns(arm(time=[0, 30, 60, 0, 19, 60])).settled
+    assert Measurement.from_columns(arm(time=[0, 20, 40, 0, 20, 40])).settled
+    assert Measurement.from_columns({'voltage': [0, 1], 'force': [0, 1]}).settled
+    assert Measurement.from_columns(
+        {'time': [0, 0], 'trial': [0, 1], 'voltage': [0, 1], 'angle': [1, 1]}).settled
+
+
+@pytest.mark.parametrize('columns, message', [
+    ({'voltage': [1, 2]}, 'no column with the response'),
+    ({'angle': [1, 2], 'time': [0, 1]}, 'no column with the drive'),
+    ({'angle': [1, 2], 'time': [0, 1], 'Voltage': [1, 2]}, "is 'Voltage' meant to be 'voltage'"),
+    ({'angel': [1, 2], 'time': [0, 1], 'voltage': [1, 2]}, "is 'angel' meant to be 'angle'"),
+    (arm(time=None, Time=[0, 1, 2, 3, 4, 5]), "column 'time' in s; is 'Time' meant"),
+    (arm(voltage=[1, 2]), 'has shape'),
+    (arm(angle=[1, 2, np.nan, 1, 1, 1]), "row 2, column 'angle' is nan"),
+    (arm(time=[0, 30, 20, 0, 30, 60]), r'time goes backwards from row 1 \(30\) to row 2'),
+    (arm(trial=[0, 0, 1, 1, 0, 0]), 'rows of trial 0 are not together'),
+    ({'voltage': [], 'force': []}, 'no rows'),
+    ({'step': [0, 1, 1], 'voltage': [0, 1, 1], 'force': [0, 1, 1]}, 'step is repeated'),
+    ({'step': [0, 1, 0], 'voltage': [0, 1, 1], 'force': [0, 1, 1]}, 'step goes backwards')])
+def test_a_table_that_makes_no_sense_is_refused_in_one_line(columns, message):
+    with pytest.raises(MeasurementError, match=message) as refused:
+        Measurement.from_columns(columns, 'run.csv')
+    assert '\n' not in str(refused.value)
+    assert str(refused.value).startswith('run.csv: ')
+
+
+def test_a_step_may_take_several_rows_of_a_sampled_run():
+    columns = arm(step=[0, 0, 1, 0, 0, 1])
+    assert Measurement.from_columns(columns).rows == 6
+
+
+@pytest.mark.parametrize('columns, words', [
+    ({'voltage': [0, 6000], 'force': [0.5, 15]}, 'voltage reaches 6000; is it in mV'),
+    ({'voltage': [0, 0.006], 'force': [0.5, 15]}, 'voltage reaches 0.006; is it in kV'),
+    ({'voltage': [0, 6], 'force': [500, 15000]}, 'force reaches 1.5e[+]04; is it in mN'),
+    ({'voltage': [0, 6], 'force': [3, 3], 'length': [0, -12]}, 'length reaches 12; is it in mm'),
+    (arm(angle=[90, 80, 70, 90, 70, 80]), 'angle reaches 90; is it in degrees'),
+    (arm(ambient_temperature=[293.0] * 6), 'ambient_temperature reaches 293; is it in kelvin'),
+    (arm(time=[0, 1e5, 2e5, 0, 1e5, 2e5]), 'is time in ms')])
+def test_units_that_are_off_by_a_thousand_are_warned_about(columns, words):
+    found = Measurement.from_columns(columns).warnings
+    assert len(found) == 1
+    assert re.search(words, found[0])
+
+
+def test_usual_values_and_a_name_that_is_almost_right():
+    assert Measurement.from_columns(arm()).warnings == ()
+    found = Measurement.from_columns(
+        {'voltage': [0, 6], 'Force': [3, 3], 'length': [0, 0.01]}).warnings
+    assert len(found) == 1 and "'Force' is not used; is 'force' meant" in found[0]
+
+
+def test_a_missing_column_is_named_with_the_closest_one():
+    table = Measurement.from_columns(arm(supply_volt=[1] * 6))
+    with pytest.raises(MeasurementError, match="no column 'supply_voltage'; is 'supply_volt'"):
+        table.column('supply_voltage')
+
+
+def staircase(levels, hold, rate=10, noise=0.0):
+    """Voltages that are held, and a response that lags; rows at `rate` Hz."""
+    time = np.arange(0, hold * len(levels), 1 / rate)
+    step = np.minimum((time / hold + 1e-9).astype(int), len(levels) - 1)
+    voltage = np.array(levels, dtype=float)[step] + noise * np.sin(time)
+    response = np.array(levels, dtype=float)[step] + np.exp(-(time - step * hold))
+    return {'time': time, 'trial': np.zeros(len(time)), 'voltage': voltage, 'angle': response}
+
+
+def test_settled_rows_take_the_end_of_every_hold():
+    table = Measurement.from_columns(staircase([1, 3, 2, 2.5], 30.0))
+    assert not table.settled
+    ends = settled_rows(table)
+    assert ends.settled
+    assert list(ends.column('voltage')) == [1, 3, 2, 2.5]
+    assert list(ends.time) == pytest.approx([29.9, 59.9, 89.9, 119.9])
+    np.testing.assert_allclose(ends.column('angle'), [1, 3, 2, 2.5], atol=1e-10)
+
+
+def test_settled_rows_average_noise_and_ignore_the_rounding_of_the_voltage():
+    table = Measurement.from_columns(staircase([1, 3, 2, 2.5], 30.0, noise=5e-4))
+    assert settled_rows(table).rows == 4
+
+
+@pytest.mark.parametrize('levels, hold', [([1, 3, 2, 2.5], 15.0), (np.linspace(0, 5, 3000), 0.1)])
+def test_a_run_without_holds_has_no_settled_rows(levels, hold):
+    assert settled_rows(Measurement.from_columns(staircase(levels, hold))) is None
+
+
+def test_a_short_hold_between_long_ones_means_that_the_run_is_not_settled():
+    columns = staircase([1, 3, 2], 30.0)
+    columns['voltage'][350:400] = 5.0
+    assert settled_rows(Measurement.from_columns(columns)) is None
+
+
+def test_a_settled_table_stays_as_it_is():
+    table = Measurement.from_columns(arm())
+    assert settled_rows(table) is table
+
+
+@settings(max_examples=50, deadline=None)
+@given(strategies.lists(strategies.sampled_from([0.0, 1.0, 2.0]), min_size=1, max_size=40))
+def test_holds_cover_a_trial_and_change_at_every_boundary(levels):
+    drive = np.array(levels)
+    found = holds(drive, slice(0, len(drive)))
+    assert found[0][0] == 0 and found[-1][1] == len(drive)
+    for (low, high), (after, _) in zip(found, found[1:]):
+        assert high == after and drive[after] != drive[low]
+    for low, high in found:
+        assert np.all(drive[low:high] == drive[low])
+
+
+def test_units_for_people():
+    assert shown('length') == ('mm', 1000.0)
+    assert shown('angle')[1] * np.pi == pytest.approx(180.0)
+    assert shown('step') == ('', 1.0)
+    assert unit_of('predicted_force') == 'N' and unit_of('other') == ''
