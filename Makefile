@@ -41,10 +41,10 @@ SOURCES := $(shell find hysteresis_ros config launch resource -type f \
 COLCON := $(VENV)/bin/python -c 'import sys; from colcon_core.command import main; sys.exit(main())'
 
 # Runs a command in the built workspace. ROS 2 from wheels does not name its own prefix.
-IN_WORKSPACE := export PATH="$(abspath $(VENV))/bin:$$PATH"; \
-	$(if $(filter sourced,$(ROS)),,export AMENT_PREFIX_PATH="$(abspath $(VENV))";) \
-	. $(abspath $(WORKSPACE))/install/local_setup.sh; \
-	HYSTERESIS_ROS_PREFIX="$(abspath $(PREFIX))" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+IN_WORKSPACE := export PATH="$$PWD/$(VENV)/bin:$$PATH"; \
+	$(if $(filter sourced,$(ROS)),,export AMENT_PREFIX_PATH="$$PWD/$(VENV)";) \
+	. ./$(WORKSPACE)/install/local_setup.sh; \
+	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .PHONY: help build demo test benchmark hidden clean force
 
