@@ -1,0 +1,437 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Weights of one sign and a free bias by constrained linear least squares (Sec. IV-B3, Eqs. 8 to 10).
+
+The operators of this package are linear in their parameters: output = rows @ weights + bias,
+where a row holds what every weight contributes at one step (for a Preisach operator the signed
+areas of its cells). The paper minimises the plain sum of squares under a sign constraint. With
+148 rows and 211 unknowns that problem has many solutions, and which of them a solver returns
+depends on its version. The default here therefore adds a small quadratic penalty::
+
+    minimise  mean((rows @ weights + bias - target)^2) / P^2  +  strength * |penalty @ x|^2
+
+with P the range of the target and x the weights as shares of P. The solution is unique; its
+strength is chosen by cross-validation over whole trials, because memory is wiped between trials
+and leaks through any finer split. With one trial only, contiguous blocks of steps are held out
+while the memory, which depends on the inputs alone, is carried through.
+"""
+
+from dataclasses import dataclass
+from typing import Optional, Sequence
+
+import numpy as np
+from scipy import linalg, optimize, stats
+
+from hysteresis_ros.errors import IdentificationError
+
+STRENGTHS = np.logspace(-9.0, -2.0, 15)
+BLOCKS = 5          # blocks of steps held out in turn when there is one trial only
+FOLDS = 8           # more trials than this share folds, so that the time stays bounded
+ANCHOR_GAIN = 1e3   # an anchor counts as much as this many times all rows together
+_TOLERANCE = 1e-11  # of the largest gradient; signs below it are rounding
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """
+    An output that is known beforehand, for example H1(0) = pretension or H2(0) = 0.
+
+    Parameters
+    ----------
+    row : ndarray, shape (K,)
+        What every weight contributes in the anchored state, like one row of the design.
+    value : float
+        Output there, in the unit of the target.
+    """
+
+    row: np.ndarray
+    value: float
+
+
+@dataclass(frozen=True)
+class WeightFit:
+    """
+    Identified weights and what the data says about them.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (K,)
+        All >= 0 when `sign` is 1, all <= 0 when it is -1.
+    bias : float
+        Output where every row entry is zero, in the unit of the target.
+    sign : int
+        1 or -1.
+    strength : float
+        Strength of the penalty; 0 for the paper's plain problem.
+    strengths, validation : ndarray, shape (S,)
+        Strengths tried and the held-out RMSE at each, in the unit of the target.
+    fitted, residual : ndarray, shape (M,)
+        Output at the rows of the fit, and output minus target.
+    output_range : float
+        P of Eqs. 23 and 24.
+    rank : int
+        Rank of rows and bias together; below K + 1 the plain problem has no unique solution.
+    condition : float
+        Largest over smallest singular value within that rank.
+    never_excited : tuple of int
+        Columns that are constant along the data: nothing was learned about their weights.
+    noise_std : float
+        Standard deviation of one output about the prediction, from held-out rows.
+    """
+
+    weights: np.ndarray
+    bias: float
+    sign: int
+    strength: float
+    strengths: np.ndarray
+    validation: np.ndarray
+    fitted: np.ndarray
+    residual: np.ndarray
+    output_range: float
+    rank: int
+    condition: float
+    never_excited: tuple
+    noise_std: float
+    active: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def mean_percent(self) -> float:
+        """Mean absolute error in percent of the output range (Eq. 23)."""
+        return float(100.0 * np.mean(np.abs(self.residual)) / self.output_range)
+
+    @property
+    def std_percent(self) -> float:
+        """Standard deviation of the error in percent of the output range (Eq. 24 over M)."""
+        return float(100.0 * np.std(self.residual) / self.output_range)
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square error in the unit of the target."""
+        return float(np.sqrt(np.mean(self.residual ** 2)))
+
+    def predict(self, rows: np.ndarray) -> np.ndarray:
+        """Return the output at `rows`, shape (m, K) -> (m,)."""
+        return np.asarray(rows) @ self.weights + self.bias
+
+    def prediction_interval(self, rows: np.ndarray, level: float = 0.95) -> tuple:
+        """
+        Return (low, high), each shape (m,), that hold one new output with probability `level`.
+
+        A linear Gaussian posterior over the weights that are not at their bound. Its variance
+        is scaled so that it explains the held-out errors, which contain the structural error
+        of the model as well as the noise.
+        """
+        rows = np.asarray(rows, dtype=float)
+        design = np.column_stack([rows, np.ones(len(rows))])[:, self.active]
+        spread = np.einsum('mi,ij,mj->m', design, self.covariance, design)
+        freedom = max(1, len(self.residual) - 1)
+        half = (stats.t.ppf(0.5 + 0.5 * level, freedom) * self.noise_std
+                * np.sqrt(1.0 + np.maximum(spread, 0.0)))
+        centre = self.predict(rows)
+        return centre - half, centre + half
+
+    def summary(self) -> dict:
+        """Return the numbers of the fit as plain types for JSON and YAML."""
+        return {
+            'rows': int(len(self.residual)),
+            'unknowns': int(len(self.weights)) + 1,
+            'sign': int(self.sign),
+            'mean_abs': float(np.mean(np.abs(self.residual))),
+            'std': float(np.std(self.residual)),
+            'rmse': self.rmse,
+            'mean_percent': self.mean_percent,
+            'std_percent': self.std_percent,
+            'output_range': float(self.output_range),
+            'bias': float(self.bias),
+            'rank': int(self.rank),
+            'condition': float(self.condition),
+            'never_excited': [int(k) for k in self.never_excited],
+            'strength': float(self.strength),
+            'cross_validation': [
+                {'strength': float(s), 'rmse': float(v)}
+                for s, v in zip(self.strengths, self.validation)],
+            'noise_std': float(self.noise_std),
+        }
+
+
+def solve_nonnegative(
+        gram: np.ndarray, moment: np.ndarray, free: np.ndarray,
+        start: Optional[np.ndarray] = None) -> tuple:
+    """
+    Minimise x @ gram @ x / 2 - moment @ x with x >= 0 except where `free`.
+
+    Block principal pivoting (Portugal, Judice and Vicente 1994; Kim and Park 2011): unknowns of
+    the wrong sign change sides together, one at a time when that stops helping, which makes it
+    finite for a positive definite `gram`. It is much faster than adding unknowns one by one, and
+    a solution for a neighbouring problem is a good start.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (K, K)
+        Symmetric positive definite.
+    moment : ndarray, shape (K,)
+    free : ndarray of bool, shape (K,)
+        Unknowns without a bound.
+    start : ndarray of bool, shape (K,), optional
+        Unknowns that are probably not at their bound.
+
+    Returns
+    -------
+    x : ndarray, shape (K,)
+    passive : ndarray of bool, shape (K,)
+        Unknowns that are not at their bound.
+
+    Raises
+    ------
+    IdentificationError
+        When `gram` is not positive definite or no solution is found.
+    """
+    size = len(moment)
+    passive = free.copy() if start is None else (start | free)
+    fewest, tries = size + 1, 3
+    gradient_tolerance = _TOLERANCE * max(float(np.max(np.abs(moment))), 1e-300)
+    for _ in range(20 * size):
+        index = np.flatnonzero(passive)
+        x = np.zeros(size)
+        try:
+            factor = linalg.cho_factor(gram[np.ix_(index, index)], check_finite=False)
+        except linalg.LinAlgError:
+            raise IdentificationError(
+                'least squares: the problem is singular; use a strength above 0') from None
+        x[index] = linalg.cho_solve(factor, moment[index], check_finite=False)
+        gradient = gram @ x - moment
+        wrong = (passive & ~free & (x < -1e-12 * np.max(np.abs(x)))) | (
+            ~passive & (gradient < -gradient_tolerance))
+        count = int(np.count_nonzero(wrong))
+        if count == 0:
+            return np.where(passive, x, 0.0), passive
+        if count < fewest:
+            fewest, tries = count, 3
+        elif tries > 0:
+            tries -= 1
+        else:
+            last = np.flatnonzero(wrong)[-1]
+            wrong = np.zeros(size, dtype=bool)
+            wrong[last] = True
+        passive = passive ^ wrong
+    raise IdentificationError(
+        'least squares: no solution found; use a larger strength or fewer levels')
+
+
+def folds_of(groups: np.ndarray) -> list:
+    """
+    Return the boolean masks, shape (M,), of the rows to hold out in turn.
+
+    Whole trials where there are two or more, otherwise contiguous blocks of steps.
+    """
+    groups = np.asarray(groups)
+    names = np.unique(groups)
+    if len(names) > 1:
+        shared = np.array_split(np.arange(len(names)), min(FOLDS, len(names)))
+        return [np.isin(groups, names[part]) for part in shared]
+    blocks = np.array_split(np.arange(len(groups)), min(BLOCKS, len(groups)))
+    return [np.isin(np.arange(len(groups)), part) for part in blocks]
+
+
+def fit_weights(
+        rows: np.ndarray, target: np.ndarray, *, groups: Optional[np.ndarray] = None,
+        scale: Optional[np.ndarray] = None, penalty: Optional[np.ndarray] = None,
+        sign: Optional[int] = 1, strength: Optional[float] = None,
+        strengths: Optional[Sequence[float]] = None,
+        anchors: Sequence[Anchor] = ()) -> WeightFit:
+    """
+    Identify weights of one sign and a free bias.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (M, K)
+        What every weight contributes at every step, the memory carried along each trial.
+    target : ndarray, shape (M,)
+        Measured output.
+    groups : ndarray, shape (M,), optional
+        Trial of every row, for cross-validation; default one trial.
+    scale : ndarray, shape (K,), optional
+        Size of every column (for a Preisach operator the area of the cell), so that weight times
+        scale has the unit of the output; default 1.
+    penalty : ndarray, shape (R, K), optional
+        Root of the quadratic penalty on weight * scale / P; default the identity (ridge).
+    sign : int or None
+        1 for weights >= 0, -1 for weights <= 0, None to take what fits better.
+    strength : float, optional
+        Of the penalty. 0 is the paper's plain problem, solved by `scipy.optimize.nnls`. Default:
+        chosen by cross-validation among `strengths`.
+    strengths : sequence of float, optional
+        Default `STRENGTHS`, 15 values over seven decades.
+    anchors : sequence of Anchor
+        Outputs to be met within 1e-5 of the residual elsewhere.
+
+    Returns
+    -------
+    WeightFit
+
+    Raises
+    ------
+    IdentificationError
+        When the data is empty, not finite, constant, or of shapes that do not fit together.
+    """
+    if sign is None:
+        fits = [fit_weights(rows, target, groups=groups, scale=scale, penalty=penalty, sign=s,
+                            strength=strength, strengths=strengths, anchors=anchors)
+                for s in (1, -1)]
+        return min(fits, key=lambda fit: fit.rmse)
+    problem = _Problem.build(rows, target, groups, scale, penalty, sign, anchors)
+    if strength == 0.0:
+        return problem.plain()
+    tried = np.asarray(STRENGTHS if strengths is None else strengths, dtype=float)
+    if strength is not None:
+        tried = np.array([float(strength)])
+    if len(tried) == 0 or not np.all(np.isfinite(tried) & (tried > 0.0)):
+        raise IdentificationError('least squares: every strength must be a number above 0')
+    return problem.regularised(tried)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """The least squares problem in dimensionless form; the last column is the bias."""
+
+    design: np.ndarray      # (M, K + 1), columns of weight shares and a column of ones
+    target: np.ndarray      # (M,), shares of P
+    extra: np.ndarray       # (A, K + 2), weighted anchor rows and their targets
+    penalty: np.ndarray     # (R, K + 1)
+    folds: list
+    unit: np.ndarray        # (K + 1,), weight = x * unit
+    output_range: float
+    sign: int
+
+    @classmethod
+    def build(cls, rows, target, groups, scale, penalty, sign, anchors):
+        rows = np.asarray(rows, dtype=float)
+        target = np.asarray(target, dtype=float)
+        if rows.ndim != 2 or target.shape != rows.shape[:1] or 0 in rows.shape:
+            raise IdentificationError(
+                f'least squares: rows {rows.shape} and target {target.shape} do not fit together')
+        if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(target))):
+            raise IdentificationError('least squares: rows and target must be finite numbers')
+        if sign not in (1, -1):
+            raise IdentificationError(f'least squares: sign must be 1 or -1, not {sign!r}')
+        size = rows.shape[1]
+        output_range = float(np.ptp(target))
+        if not output_range > 0.0:
+            raise IdentificationError(
+                'least squares: the measured output is constant; excite the muscle more')
+        scale = np.ones(size) if scale is None else np.asarray(scale, dtype=float)
+        if scale.shape != (size,) or not np.all(scale > 0.0):
+            raise IdentificationError('least squares: every column needs a scale above 0')
+        penalty = np.eye(size) if penalty is None else np.asarray(penalty, dtype=float)
+        if penalty.ndim != 2 or penalty.shape[1] != size:
+            raise IdentificationError(
+                f'least squares: penalty {penalty.shape} needs {size} columns')
+        groups = np.zeros(len(target)) if groups is None else np.asarray(groups)
+        if groups.shape != target.shape:
+            raise IdentificationError('least squares: every row needs its trial')
+        unit = np.append(sign * output_range / scale, output_range)
+        extra = np.array([
+            np.concatenate([anchor.row * unit[:-1] / output_range, [1.0],
+                            [anchor.value / output_range]]) for anchor in anchors])
+        return cls(
+            design=np.column_stack([rows * (unit[:-1] / output_range), np.ones(len(target))]),
+            target=target / output_range,
+            extra=ANCHOR_GAIN * extra.reshape(len(anchors), size + 2),
+            penalty=np.column_stack([penalty, np.zeros(len(penalty))]),
+            folds=folds_of(groups), unit=unit, output_range=output_range, sign=sign)
+
+    @property
+    def free(self) -> np.ndarray:
+        """Mark the bias, the one unknown without a bound."""
+        return np.arange(len(self.unit)) == len(self.unit) - 1
+
+    def plain(self) -> WeightFit:
+        """Solve the paper's problem: no penalty, bias as the difference of two columns."""
+        design = np.vstack([self.design / np.sqrt(len(self.target)), self.extra[:, :-1]])
+        target = np.append(self.target / np.sqrt(len(self.target)), self.extra[:, -1])
+        design = np.column_stack([design, -design[:, -1]])
+        triangle, rotated = _reduce(design, target)
+        try:
+            x, _ = optimize.nnls(triangle, rotated, maxiter=30 * design.shape[1])
+        except RuntimeError:
+            raise IdentificationError(
+                'least squares: nnls did not converge; use a strength above 0') from None
+        x = np.append(x[:-2], x[-2] - x[-1])
+        passive = (x > 0.0) | self.free
+        block = self.design[:, passive]
+        covariance = np.linalg.pinv(block.T @ block, hermitian=True)
+        errors = self.design @ x - self.target
+        freedom = max(1, len(errors) - int(np.count_nonzero(passive)))
+        noise = float(np.sqrt(np.sum(errors ** 2) / freedom))
+        return self._result(x, passive, covariance, noise, 0.0, np.zeros(0), np.zeros(0))
+
+    def regularised(self, strengths: np.ndarray) -> WeightFit:
+        """Choose the strength on held-out rows, then fit all rows with it."""
+        curvature = self.penalty.T @ self.penalty
+        anchored = self.extra[:, :-1].T @ self.extra
+        errors = np.empty((len(strengths), len(self.target)))
+        for held in self.folds:
+            gram, moment = _moments(self.design[~held], self.target[~held], anchored)
+            passive = None
+            for k in np.argsort(strengths)[::-1]:
+                x, passive = solve_nonnegative(
+                    gram + strengths[k] * curvature, moment, self.free, passive)
+                errors[k, held] = self.design[held] @ x - self.target[held]
+        validation = np.sqrt(np.mean(errors ** 2, axis=1))
+        best = int(np.argmin(validation))
+        strength = float(strengths[best])
+        gram, moment = _moments(self.design, self.target, anchored)
+        x, passive = solve_nonnegative(gram + strength * curvature, moment, self.free)
+        x = self._polish(x, passive, strength)
+        precision = len(self.target) * (gram + strength * curvature)[np.ix_(passive, passive)]
+        covariance = linalg.inv(precision)
+        block = self.design[:, passive]
+        leverage = np.einsum('mi,ij,mj->m', block, covariance, block)
+        noise = float(np.sqrt(np.mean(errors[best] ** 2 / (1.0 + leverage))))
+        return self._result(x, passive, covariance, noise, strength, strengths,
+                            validation * self.output_range)
+
+    def _polish(self, x: np.ndarray, passive: np.ndarray, strength: float) -> np.ndarray:
+        """Solve again for the unknowns off their bound, without squaring the condition."""
+        root = np.sqrt(len(self.target))
+        design = np.vstack([self.design / root, self.extra[:, :-1],
+                            np.sqrt(strength) * self.penalty])[:, passive]
+        target = np.concatenate([self.target / root, self.extra[:, -1],
+                                 np.zeros(len(self.penalty))])
+        polished = np.zeros_like(x)
+        polished[passive] = linalg.lstsq(design, target, lapack_driver='gelsy')[0]
+        return np.where(self.free, polished, np.maximum(polished, 0.0))
+
+    def _result(self, x, passive, covariance, noise, strength, strengths, validation):
+        values = x * self.unit
+        singular = np.linalg.svd(self.design, compute_uv=False)
+        rank = int(np.count_nonzero(
+            singular > singular[0] * max(self.design.shape) * np.finfo(float).eps))
+        still = np.ptp(self.design[:, :-1], axis=0) <= 1e-12
+        fitted = (self.design @ x) * self.output_range
+        target = self.target * self.output_range
+        scaled = np.outer(self.unit[passive], self.unit[passive]) / self.output_range ** 2
+        return WeightFit(
+            weights=values[:-1], bias=float(values[-1]), sign=self.sign, strength=strength,
+            strengths=strengths, validation=validation, fitted=fitted, residual=fitted - target,
+            output_range=self.output_range, rank=rank,
+            condition=float(singular[0] / singular[rank - 1]),
+            never_excited=tuple(int(k) for k in np.flatnonzero(still)),
+            noise_std=noise * self.output_range, active=np.flatnonzero(passive),
+            covariance=covariance * scaled)
+
+
+def _moments(design: np.ndarray, target: np.ndarray, anchored: np.ndarray) -> tuple:
+    """Return the mean Gram matrix and the mean of design times target, anchors added."""
+    return (design.T @ design / len(target) + anchored[:, :-1],
+            design.T @ target / len(target) + anchored[:, -1])
+
+
+def _reduce(design: np.ndarray, target: np.ndarray) -> tuple:
+    """Return an equivalent problem with no more rows than unknowns, by one QR."""
+    if len(target) <= design.shape[1]:
+        return design, target
+    orthogonal, triangle = linalg.qr(design, mode='economic')
+    return triangle, orthogonal.T @ target
