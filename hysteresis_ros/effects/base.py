@@ -149,6 +149,8 @@ class Effect(abc.ABC):
     kinds: ClassVar[tuple] = ('arm',)
     # Whether only a recording with transients can show it.
     needs_transients: ClassVar[bool] = False
+    # Whether a simulation that leaves rows out would not show it.
+    needs_every_row: ClassVar[bool] = False
     # Whether the maps need the martensite share, which a first pass without them gives.
     needs_phase: ClassVar[bool] = False
     # A recorded column without which the effect cannot be told.

@@ -46,6 +46,7 @@ class ViscousFriction(MechanismEffect):
     experiment = 'let the arm swing freely'
     confused_with = ('thermal_lag', 'latency')
     needs_transients = True
+    needs_every_row = True
     invertible = False
     parameters = (
         Parameter('b', 'N m s/rad', 'moment per angular velocity', 0.001, 4.0, 0.0, (0.05, 1.0),
@@ -67,6 +68,7 @@ class Inertia(MechanismEffect):
     experiment = 'pluck the arm and log fast'
     confused_with = ('viscous_friction',)
     needs_transients = True
+    needs_every_row = True
     invertible = False
     parameters = (
         Parameter('I', 'kg m^2', 'moment of inertia about the pivot', 0.001, 0.1, 0.0, (0.01,),

@@ -171,7 +171,7 @@ class Simulator:
     def _angle(self, chain, balance, trial, inputs):
         cold, x, heat, _ = self._first(chain, trial, inputs)
         offset, factor = chain.drift(trial.drive, heat, inputs)
-        chosen = self._chosen_rows(x, offset)
+        chosen = self._chosen_rows(x)
         times = inputs.time[chosen]
         steps = np.diff(times, prepend=0.0).tolist()
         balance.start()
@@ -183,17 +183,33 @@ class Simulator:
             return np.array(angles)
         return np.interp(inputs.time, times, angles)
 
-    def _chosen_rows(self, x, offset):
+    def _chosen_rows(self, x):
         rows = np.arange(len(x))
         if self.stride == 1:
             return rows
-        keep = rows % self.stride == 0
-        change = np.diff(x)
-        turn = np.flatnonzero(change[1:] * change[:-1] <= 0.0) + 1
-        moving = (change[turn] != 0.0) | (change[turn - 1] != 0.0)
-        keep[turn[moving]] = True
-        keep[[0, -1]] = True
-        return rows[keep]
+        return rows[(rows % self.stride == 0) | turning_rows(x)]
+
+
+def turning_rows(x: np.ndarray) -> np.ndarray:
+    """
+    Say which rows a rate-independent memory must see: the turns of x, its first and its last.
+
+    Parameters
+    ----------
+    x : ndarray, shape (rows,)
+
+    Returns
+    -------
+    ndarray of bool, shape (rows,)
+    """
+    keep = np.zeros(len(x), dtype=bool)
+    keep[[0, -1]] = True
+    change = np.sign(np.diff(x))
+    # Over a rest the last direction counts.
+    moving = np.flatnonzero(change)
+    turns = moving[1:][change[moving[1:]] != change[moving[:-1]]]
+    keep[turns] = True
+    return keep
 
 
 def predict(model, measurement) -> np.ndarray:

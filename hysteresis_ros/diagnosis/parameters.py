@@ -1,0 +1,100 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Free parameters of effects as one vector that an optimiser can move."""
+
+import itertools
+import math
+
+import numpy as np
+
+
+class ParameterVector:
+    """
+    The parameters of some effects that are fitted to one kind of measurement.
+
+    Positive parameters over decades are moved on a logarithmic scale, all others in units of their
+    plausible range, so that every component has a size of about one.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        The effects that are fitted, with the values that stay fixed.
+    kind : str
+        'arm' or 'bench'.
+    """
+
+    def __init__(self, effects, kind: str):
+        self.effects = list(effects)
+        self.entries = [(index, parameter) for index, effect in enumerate(self.effects)
+                        for parameter in effect.parameters
+                        if kind in parameter.kinds and not parameter.choices]
+        self.lower, self.upper = (
+            np.array([_to_unit(parameter, parameter.bounds[side])
+                      for _, parameter in self.entries]) for side in (0, 1))
+
+    def __len__(self) -> int:
+        """Return the number of free parameters."""
+        return len(self.entries)
+
+    def vector(self) -> np.ndarray:
+        """Return the present values, shape (k,)."""
+        return np.clip([_to_unit(parameter, self.effects[index].values[parameter.name])
+                        for index, parameter in self.entries], self.lower, self.upper)
+
+    def with_vector(self, vector) -> list:
+        """Return the effects with the values of a vector of shape (k,)."""
+        values = [{} for _ in self.effects]
+        for (index, parameter), value in zip(self.entries, np.clip(
+                vector, self.lower, self.upper)):
+            values[index][parameter.name] = _from_unit(parameter, float(value))
+        return [effect.with_values(**changed)
+                for effect, changed in zip(self.effects, values)]
+
+    def with_intervals(self, vector, half_widths) -> list:
+        """Return the effects at `vector` (k,) with the intervals of `half_widths` (k,)."""
+        effects = self.with_vector(vector)
+        ends = np.clip(np.stack([vector - half_widths, vector + half_widths]),
+                       self.lower, self.upper)
+        for (index, parameter), low, high in zip(self.entries, *ends):
+            effects[index].intervals[parameter.name] = (
+                _from_unit(parameter, float(low)), _from_unit(parameter, float(high)))
+        return effects
+
+    def at_bound(self, vector) -> list[bool]:
+        """Say for each effect whether a component (k,) has run into the end of its range."""
+        margin = 0.01 * (self.upper - self.lower)
+        touching = (vector <= self.lower + margin) & (self.lower != 0.0)
+        touching |= vector >= self.upper - margin
+        return [any(touching[k] for k, (index, _) in enumerate(self.entries) if index == number)
+                for number in range(len(self.effects))]
+
+
+def _unit(parameter) -> float:
+    return max(parameter.high if parameter.both_signs else parameter.high - parameter.low, 1e-12)
+
+
+def _to_unit(parameter, value: float) -> float:
+    if parameter.log:
+        return math.log(max(value, parameter.bounds[0]))
+    return value / _unit(parameter)
+
+
+def _from_unit(parameter, value: float) -> float:
+    return math.exp(value) if parameter.log else value * _unit(parameter)
+
+
+def starts_of(effect, kind: str, most: int = 9) -> list:
+    """
+    Return copies of `effect` at the values from which a fit may start.
+
+    All combinations of the starts of its parameters, thinned evenly to at most `most`.
+    """
+    fitted = [parameter for parameter in effect.parameters if kind in parameter.kinds]
+    combinations = list(itertools.product(
+        *(parameter.choices or parameter.starts for parameter in fitted)))
+    if len(combinations) > most:
+        chosen = np.linspace(0, len(combinations) - 1, most).round().astype(int)
+        combinations = [combinations[index] for index in chosen]
+    return [effect.with_values(**{parameter.name: value
+                                  for parameter, value in zip(fitted, combination)})
+            for combination in combinations]

@@ -1,0 +1,308 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What effects are judged on: measured rows, how they are held out, and the model's answer to them.
+
+An arm run is judged with the weights that the bench gave, frozen: refitted weights would absorb
+most of what an effect does. A bench table is where those weights come from, so there every set of
+effects gets weights of its own, fitted to the rows that are not held out.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from hysteresis_ros.effects import SensorEffect
+from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.identification.least_squares import fit_weights
+from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.simulation import Simulator, turning_rows
+from hysteresis_ros.operators import Preisach, cell_areas, signed_areas
+
+# A continuous run is judged on about this many rows; between them nothing new is learned.
+MOST_ROWS = 1500
+MOST_FOLDS = 4
+# Blocks for significance: about this many a recording.
+BLOCKS = 24
+# Strengths of the weights' regularisation that are tried when weights are refitted.
+STRENGTHS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+
+
+def sensor_resolution(measurement) -> float:
+    """Return the standard deviation that the steps of the response's sensor cause."""
+    values = np.unique(measurement.column(measurement.response))
+    steps = np.diff(values)
+    steps = steps[steps > 1e-9 * max(np.ptp(values), 1e-300)]
+    return float(np.min(steps) / np.sqrt(12.0)) if len(steps) else 0.0
+
+
+class Problem:
+    """
+    Measured rows of one or more recordings of one kind.
+
+    Attributes
+    ----------
+    measured : ndarray, shape (n,)
+        The response in the rows that are judged.
+    trial, fold, block : ndarray of int, shape (n,)
+        Which trial a row is of, which rows are held out together, and which count as one in the
+        significance.
+    signals : dict of str to ndarray, shape (n,)
+        What was recorded or follows from it: drive, rate, time, since_step, cycles, ...
+    """
+
+    def __init__(self, model, measurements):
+        self.model = model
+        self.measurements = measurements
+        self.kind = measurements[0].kind
+        self.response = measurements[0].response
+        self.settled = all(m.settled for m in measurements)
+        rows = sum(m.rows for m in measurements)
+        self.stride = max(1, rows // MOST_ROWS)
+        self.simulators = [Simulator(model, m, self.stride) for m in measurements]
+        self.chosen = [np.arange(0, m.rows, self.stride) for m in measurements]
+        self.measured = self.pick([m.column(m.response) for m in measurements])
+        self.noise = max(sensor_resolution(m) for m in measurements)
+        self._divide()
+        self.signals = self._signals()
+
+    def pick(self, columns) -> np.ndarray:
+        """Return the judged rows of a column given for every recording, shape (n,)."""
+        return np.concatenate([column[rows] for column, rows in zip(columns, self.chosen)])
+
+    def _divide(self):
+        """Hold out whole trials; with a single one, blocks in time."""
+        count, columns = 0, []
+        for measurement in self.measurements:
+            index = np.empty(measurement.rows, dtype=int)
+            for _, part in measurement.split():
+                index[part] = count
+                count += 1
+            columns.append(index)
+        self.trial = self.pick(columns)
+        position = np.arange(len(self.trial))
+        if count > 1:
+            self.fold = self.trial % min(count, MOST_FOLDS)
+        else:
+            self.fold = position * (2 * MOST_FOLDS) // len(position) % MOST_FOLDS
+        parts = max(1, round(BLOCKS / count))
+        self.block = np.empty(len(position), dtype=int)
+        number = 0
+        for trial in np.unique(self.trial):
+            rows = np.flatnonzero(self.trial == trial)
+            pieces = max(min(parts, len(rows) // 3), 1)
+            self.block[rows] = number + np.arange(len(rows)) * pieces // len(rows)
+            number += pieces
+
+    @property
+    def folds(self) -> np.ndarray:
+        """Identifiers of the folds."""
+        return np.unique(self.fold)
+
+    def _signals(self) -> dict:
+        columns: dict[str, list] = {}
+        for simulator in self.simulators:
+            parts: dict[str, list] = {}
+            for trial in simulator.trials:
+                drive, time = trial.drive, np.asarray(trial.inputs.time)
+                change = np.diff(drive, prepend=self.model.cold_drive)
+                moving = np.abs(change) > 1e-3 * max(np.ptp(drive), 1e-12)
+                last = np.maximum.accumulate(np.where(moving, np.arange(len(drive)), 0))
+                of_trial = {
+                    'drive': drive, 'load': trial.load,
+                    'rate': np.gradient(drive, time) if len(drive) > 1 else np.zeros(1),
+                    'direction': np.sign(change)[last], 'time': time,
+                    'clock': trial.inputs.clock, 'since_step': time - time[last],
+                    'cycles': trial.inputs.cycles, 'ambient': trial.inputs.ambient}
+                for name, values in of_trial.items():
+                    parts.setdefault(name, []).append(values)
+            for name, values in parts.items():
+                columns.setdefault(name, []).append(np.concatenate(values))
+        signals = {name: self.pick(values) for name, values in columns.items()}
+        return {name: values for name, values in signals.items()
+                if np.all(np.isfinite(values)) and np.ptp(values) > 0.0}
+
+
+class ArmProblem(Problem):
+    """Arm runs, simulated with the frozen weights of the bench."""
+
+    refits = False
+
+    def simulate(self, effects, train=None) -> np.ndarray:
+        """
+        Return the simulated response of the judged rows, shape (n,).
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        train : ndarray of bool, shape (n,), optional
+            Not used: nothing but the effects' own parameters is fitted here.
+        """
+        dense = self.settled or any(effect.needs_every_row for effect in effects)
+        columns = []
+        for simulator in self.simulators:
+            simulator.stride = 1 if dense else self.stride
+            columns.append(simulator.run(effects))
+        return self.pick(columns)
+
+    def completed(self, effects):
+        """Return the model with these effects."""
+        return self.model.with_effects(effects)
+
+
+@dataclasses.dataclass
+class Design:
+    """The least squares problem of H2's weights: areas (n, K), known part (n,), grid nodes."""
+
+    rows: np.ndarray
+    known: np.ndarray
+    nodes: np.ndarray
+
+
+class BenchProblem(Problem):
+    """Bench tables, with weights refitted to the training rows for every set of effects."""
+
+    refits = True
+
+    def __init__(self, model, measurements):
+        super().__init__(model, measurements)
+        stage = model.require_length_stage()
+        if not isinstance(stage, Preisach):
+            raise MeasurementError(f'effects on bench tables need a Preisach length stage, this '
+                                   f'model has a {stage.kind} one; identify it with --operator '
+                                   'two-stage or preisach')
+        self.levels = len(stage.nodes) - 1
+        self._strength = None
+
+    def _design(self, effects) -> Design:
+        model = self.model
+        chain = Chain(effects, model.surroundings)
+        first = model.first_stage(chain)
+        cold = chain.to_heat(model.cold_drive)
+        parts, scales, known = [], [], []
+        for simulator in self.simulators:
+            for trial in simulator.trials:
+                inputs = trial.inputs
+                if chain.needs_phase:
+                    inputs = inputs._replace(phase=self._phase(simulator, trial))
+                heat = chain.heat(trial.drive, inputs)
+                first.reset()
+                x = first.simulate(np.concatenate(([cold], heat)))
+                load = chain.load_inside(trial.load) if first.loaded else 0.0 * trial.load
+                parts.append(model.sign * (x - np.concatenate((load[:1], load))))
+                offset, factor = chain.drift(trial.drive, heat, inputs)
+                scales.append(chain.scale(trial.load) * factor)
+                known.append(chain.stretch(trial.load) + offset)
+        low = min(part.min() for part in parts)
+        high = max(part.max() for part in parts)
+        margin = 1e-6 * max(high - low, 1e-12)
+        nodes = np.linspace(low - margin, high + margin, self.levels + 1)
+        picked = self._picked()
+        rows = np.concatenate([
+            _areas(nodes, part, keep) for part, keep in zip(parts, picked)])
+        rows *= np.concatenate([scale[keep] for scale, keep in zip(scales, picked)])[:, None]
+        return Design(rows, np.concatenate(
+            [value[keep] for value, keep in zip(known, picked)]), nodes)
+
+    def _picked(self) -> list:
+        """Judged rows of each trial, counted from the trial's first."""
+        picked = []
+        for simulator, chosen in zip(self.simulators, self.chosen):
+            for trial in simulator.trials:
+                inside = (chosen >= trial.rows.start) & (chosen < trial.rows.stop)
+                picked.append(chosen[inside] - trial.rows.start)
+        return picked
+
+    def _phase(self, simulator, trial):
+        measured = simulator.measurement.column(self.response)[trial.rows]
+        low, high = self.model.ranges.get(self.response, (measured.min(), measured.max()))
+        return np.clip((measured - low) / max(high - low, 1e-12), 0.0, 1.0)
+
+    def fit_stage(self, effects, train=None, strength=None):
+        """
+        Fit H2's weights to the training rows.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        train : ndarray of bool, shape (n,), optional
+            Rows to fit; all by default.
+        strength : float, optional
+            Of the regularisation; cross-validated over the training trials by default.
+
+        Returns
+        -------
+        WeightFit, Design
+        """
+        design = self._design(effects)
+        train = np.ones(len(self.measured), dtype=bool) if train is None else train
+        groups = self.trial if len(np.unique(self.trial[train])) > 1 else self.block
+        fit = fit_weights(
+            design.rows[train], (self.measured - design.known)[train], groups=groups[train],
+            scale=2.0 * cell_areas(design.nodes), strength=strength, strengths=STRENGTHS)
+        return fit, design
+
+    def simulate(self, effects, train=None) -> np.ndarray:
+        """Return the response of the judged rows, shape (n,), weights fitted to `train` (n,)."""
+        if self._strength is None:
+            self._strength = self.fit_stage(self.model.effects)[0].strength
+        fit, design = self.fit_stage(effects, train, self._strength)
+        response = fit.predict(design.rows) + design.known
+        for effect in effects:
+            if isinstance(effect, SensorEffect):
+                response = self._sensed(effect, response)
+        return response
+
+    def _sensed(self, effect, response):
+        sensed = response.copy()
+        for trial in np.unique(self.trial):
+            rows = self.trial == trial
+            inputs = self.simulators[0].trials[0].inputs._replace(
+                time=self.signals['time'][rows])
+            sensed[rows] = effect.forward(response[rows], inputs)
+        return sensed
+
+    def completed(self, effects):
+        """Return the model with these effects and H2's weights refitted to all rows."""
+        fit, design = self.fit_stage(effects)
+        bias = fit.bias + float(fit.weights @ cell_areas(design.nodes))
+        return dataclasses.replace(
+            self.model, effects=list(effects),
+            length_stage=Preisach(design.nodes, fit.weights, bias))
+
+
+def _areas(nodes, part, keep):
+    """Areas above the cold state, (rows, K), of the kept rows; the first input is the cold one."""
+    wanted = np.zeros(len(part), dtype=bool)
+    wanted[keep + 1] = True
+    needed = wanted | turning_rows(part)
+    areas = signed_areas(nodes, part[needed]) + cell_areas(nodes)
+    return areas[wanted[needed]]
+
+
+def problem_for(model, measurements) -> Problem:
+    """
+    Return the problem that suits the kind of the measurements.
+
+    Raises
+    ------
+    MeasurementError
+        If they are of kinds that cannot be judged together, or hold nothing to explain.
+    """
+    measurements = list(measurements)
+    if not measurements:
+        raise MeasurementError('no measurement was given; name CSV files or bag folders')
+    if all(m.kind == 'bench' for m in measurements):
+        measurements = [m for m in measurements if m.response != 'force']
+        if not measurements:
+            raise MeasurementError('a force table at resting length has no load to explain; give '
+                                   'the length table as well')
+    kinds = sorted({f'{m.kind} {m.response}' for m in measurements})
+    if len(kinds) > 1:
+        raise MeasurementError(f'the measurements are of several kinds ({", ".join(kinds)}); give '
+                               'either bench tables or arm runs')
+    if measurements[0].kind == 'bench':
+        return BenchProblem(model, measurements)
+    return ArmProblem(model, measurements)
