@@ -80,10 +80,10 @@ class Spec:
 
 
 GEOMETRY = (
-    Spec('clamp_distance', 0.04, 'Distance x from the elbow to the clamp along the forearm', 'm',
+    Spec('clamp_distance', 0.017, 'Distance x from the elbow to the clamp along the forearm', 'm',
          0.001, 1.0),
-    Spec('clamp_height', 0.01, 'Height a of the clamp above the forearm', 'm', 0.0, 1.0),
-    Spec('anchor_height', 0.30, 'Height y of the upper end of the muscles above the elbow', 'm',
+    Spec('clamp_height', 0.006, 'Height a of the clamp above the forearm', 'm', 0.0, 1.0),
+    Spec('anchor_height', 0.2655, 'Height y of the upper end of the muscles above the elbow', 'm',
          0.01, 2.0),
     Spec('forearm_length', 0.30, 'Length l of the forearm, at whose end the payload hangs', 'm',
          0.01, 2.0),
@@ -100,25 +100,42 @@ NAMES = (
     Spec('hardware_id', 'sma_bicep', 'Name of this arm in diagnostics', read_only=True),
 )
 
+MODEL = (
+    Spec('model_file', '', 'Model file that `hysteresis identify` or `extend` wrote; empty for the '
+         'model that comes with the package', read_only=True),
+)
+
+ANGLE_LIMITS = (
+    Spec('minimum_angle', 0.0, 'Smallest target angle that is passed on', 'rad', 0.0, 3.2),
+    Spec('maximum_angle', 3.2, 'Largest target angle that is passed on', 'rad', 0.0, 3.2),
+)
+
 VOLTAGE_LIMITS = (
     Spec('minimum_voltage', 0.0, 'Smallest voltage that is ever commanded', 'V', 0.0, 48.0),
     Spec('maximum_voltage', 6.0, 'Largest voltage that is ever commanded', 'V', 0.0, 48.0),
 )
 
 
-def check_voltage_limits(values: Mapping) -> None:
+def check_limits(values: Mapping, quantity: str) -> None:
     """
-    Refuse voltage limits that leave nothing between them.
+    Refuse limits that leave nothing between them.
+
+    Parameters
+    ----------
+    values : mapping
+        Values by parameter name.
+    quantity : str
+        ``'voltage'`` for ``minimum_voltage`` and ``maximum_voltage``, and so on.
 
     Raises
     ------
     ParameterError
-        If ``minimum_voltage`` is not below ``maximum_voltage``.
+        If the minimum is not below the maximum.
     """
-    if values['minimum_voltage'] >= values['maximum_voltage']:
+    low, high = values[f'minimum_{quantity}'], values[f'maximum_{quantity}']
+    if low >= high:
         raise ParameterError(
-            f'minimum_voltage {values["minimum_voltage"]:g} V has to be below '
-            f'maximum_voltage {values["maximum_voltage"]:g} V')
+            f'minimum_{quantity} {low:g} has to be below maximum_{quantity} {high:g}')
 
 
 class Parameters(Mapping):

@@ -1,0 +1,212 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From what the muscle has to do to the voltage that makes it do so (Eqs. 12 to 14).
+
+Subscribes `muscle_reference`, publishes `voltage_setpoint`. The node holds the memory of the two
+hysteresis stages: each reference moves it once, in the order of arrival. While nothing new comes
+the last setpoint is repeated, which does not move the memory, so that the watchdog behind
+`voltage_setpoint` does not end a long hold.
+
+When the bridge's ``~/initialise`` has heated and cooled the muscle, call this node's ``~/reset``:
+the muscle's memory is wiped then, and the model's has to follow.
+"""
+
+import math
+
+from rclpy.node import Node
+from sensor_msgs.msg import JointState, Temperature
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
+from hysteresis_ros.errors import HysteresisError, ParameterError, RangeError
+from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, WARN
+from hysteresis_ros.nodes.feedback import AngleFeedback
+from hysteresis_ros.nodes.parameters import (
+    check_limits, GEOMETRY, MODEL, NAMES, Parameters, Spec, VOLTAGE_LIMITS)
+from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
+from hysteresis_ros.nodes.reference import (
+    ArmReference, load_model, needs_ambient, read_angle, read_reference, seconds)
+from hysteresis_ros.nodes.running import run
+
+COMPENSATION = (
+    Spec('republish_period', 0.5, 'Time after which the last setpoint is repeated; 0 for never',
+         's', 0.0, 60.0),
+    Spec('dead_band', 0.0, 'Reversals of the reference length up to this are not followed, '
+         'because the inverse amplifies their noise', 'm', 0.0, 0.01),
+    Spec('horizon', 0.0, 'Time in which a lagging muscle is to reach its temperature, overdriven '
+         'within the limits; 0 for never overdriven', 's', 0.0, 600.0),
+    Spec('feedback', False, 'Whether the measured angle corrects the setpoint slowly',
+         read_only=True),
+    Spec('feedback_gain', 0.1, 'Correction rate of the target angle per error', '1/s', 0.0, 10.0),
+    Spec('feedback_limit', 0.15, 'Largest correction of the target angle', 'rad', 0.0, 1.0),
+    Spec('feedback_rest_speed', 0.005, 'Speed above which the arm is on its way and the '
+         'correction waits', 'rad/s', 0.0001, 10.0),
+    Spec('feedback_dead_band', 0.003, 'Angle error that is left alone', 'rad', 0.0, 1.0),
+    Spec('feedback_period', 1.0, 'Time between two corrections', 's', 0.01, 60.0),
+)
+
+
+class CompensatorNode(Node):
+    """
+    The node `hysteresis_compensator`.
+
+    Parameters
+    ----------
+    model : MuscleModel, optional
+        Used instead of the one that the parameter ``model_file`` names.
+    **options
+        For `rclpy.node.Node`, such as ``namespace`` or ``parameter_overrides``.
+    """
+
+    PARAMETERS = MODEL + VOLTAGE_LIMITS + COMPENSATION + GEOMETRY + NAMES
+
+    def __init__(self, model=None, **options):
+        super().__init__('hysteresis_compensator', **options)
+        parameters = Parameters(
+            self, self.PARAMETERS, check=_check, changed=self._configure)
+        self._model = model or load_model(
+            parameters['model_file'], parameters, self.get_logger())
+        self._controller = self._model.controller()
+        self._integral = AngleFeedback()
+        self._timer = None
+        self._ambient = math.nan
+        self._received = self._published = self._repeated = self._refused = 0
+        self._forget()
+        self._publisher = self.create_publisher(Float64, 'voltage_setpoint', COMMANDS)
+        self._diagnostics = Diagnostics(
+            self, parameters['hardware_id'], self._counts, 'compensating')
+        self._configure(parameters)
+        self.create_subscription(JointState, 'muscle_reference', self._on_reference, COMMANDS)
+        if parameters['feedback']:
+            self.create_subscription(
+                JointState, 'joint_states', self._on_joint_states, MEASUREMENTS)
+        if needs_ambient(self._model):
+            self.create_subscription(
+                Temperature, 'ambient_temperature', self._on_ambient, MEASUREMENTS)
+        self.create_service(Trigger, '~/reset', self._on_reset)
+
+    def _configure(self, parameters):
+        self._muscle, self._joint = parameters['muscle_name'], parameters['joint_name']
+        self._feedback = parameters['feedback']
+        self._geometry = BicepGeometry.from_mapping(parameters)
+        self._arm = ArmReference(self._geometry, self._model)
+        self._controller.limits = parameters['minimum_voltage'], parameters['maximum_voltage']
+        self._controller.dead_band = parameters['dead_band']
+        self._controller.horizon = parameters['horizon'] or math.inf
+        self._integral.configure(*(parameters[f'feedback_{name}'] for name in (
+            'gain', 'limit', 'rest_speed', 'dead_band', 'period')))
+        if self._timer is not None:
+            self.destroy_timer(self._timer)
+            self._timer = None
+        if parameters['republish_period'] > 0.0:
+            self._timer = self.create_timer(parameters['republish_period'], self._repeat)
+
+    def _forget(self):
+        self._wanted = None
+        self._target = math.nan
+        self._saturated = 0
+        self._integral.reset()
+
+    def _now(self):
+        return 1e-9 * self.get_clock().now().nanoseconds
+
+    def _on_reference(self, message):
+        self._received += 1
+        try:
+            wanted = read_reference(message, self._muscle)
+            target = self._arm.angle(wanted.length) if self._feedback else math.nan
+        except RangeError as error:
+            self._refused += 1
+            self._diagnostics.set('reference', WARN, f'reference not followed: {error}')
+            return
+        self._diagnostics.clear('reference')
+        self._wanted, self._target = wanted, target
+        self._apply(self._corrected(wanted))
+
+    def _corrected(self, wanted):
+        """Return the reference with the feedback's correction of the angle."""
+        correction = self._integral.correction
+        if correction == 0.0:
+            return wanted
+        # What the geometry alone says of a small turn; the rest of the reference stays.
+        low, high = self._geometry.angle_range
+        before = float(self._geometry.angle(wanted.length))
+        after = min(max(before + correction, low), high)
+        force = self._geometry.force(after) - self._geometry.force(before)
+        return Reference(float(self._geometry.length(after)), float(wanted.force + force))
+
+    def _apply(self, reference):
+        try:
+            setpoint = self._controller.setpoint(
+                reference.length, reference.force, self._now(), ambient=self._ambient)
+            if not math.isfinite(setpoint.voltage):
+                raise RangeError(f'the model has no voltage for {reference}')
+        except HysteresisError as error:
+            self._refused += 1
+            self._diagnostics.set('setpoint', ERROR, f'no setpoint: {error}')
+            return
+        self._diagnostics.clear('setpoint')
+        self._publish(setpoint.voltage)
+        self._published += 1
+        if setpoint.saturated:
+            # Expected too short: a larger angle is still possible, a smaller one is not.
+            self._saturated = -1 if setpoint.error > 0.0 else 1
+            self._diagnostics.set('saturated', WARN, (
+                f'saturated: {setpoint.reason} (error {1e3 * setpoint.error:+.3f} mm)'))
+        else:
+            self._saturated = 0
+            self._diagnostics.clear('saturated')
+
+    def _publish(self, voltage):
+        self._publisher.publish(Float64(data=voltage))
+        self._voltage = voltage
+        if self._timer is not None:
+            self._timer.reset()
+
+    def _repeat(self):
+        if self._wanted is not None:
+            self._publish(self._controller.hold(self._now()))
+            self._repeated += 1
+
+    def _on_joint_states(self, message):
+        angle = read_angle(message, self._joint)
+        if self._wanted is None or angle is None:
+            return
+        before = self._integral.correction
+        correction = self._integral.step(
+            seconds(message.header.stamp), angle, self._target, self._saturated)
+        if correction != before:
+            self._apply(self._corrected(self._wanted))
+
+    def _on_ambient(self, message):
+        self._ambient = message.temperature
+
+    def _on_reset(self, request, response):
+        self._controller.reset()
+        self._forget()
+        self._diagnostics.clear('saturated')
+        response.success = True
+        response.message = 'memory wiped; the setpoint is repeated again from the next reference'
+        self.get_logger().info(response.message)
+        return response
+
+    def _counts(self):
+        return {'references received': self._received, 'setpoints published': self._published,
+                'setpoints repeated': self._repeated, 'references refused': self._refused,
+                'feedback correction [rad]': self._integral.correction}
+
+
+def _check(values):
+    check_limits(values, 'voltage')
+    BicepGeometry.from_mapping(values)
+    horizon, period = values['horizon'], values['republish_period']
+    if horizon > 0.0 and not 0.0 < period <= horizon:
+        raise ParameterError(f'horizon {horizon:g} s needs a republish_period above 0 and not '
+                             f'above the horizon, not {period:g} s')
+
+
+def main(args=None) -> int:
+    """Run the node."""
+    return run(CompensatorNode, args)

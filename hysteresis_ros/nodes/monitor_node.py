@@ -1,0 +1,129 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The model beside the arm: what it predicts for the applied voltage, and what is left over.
+
+Subscribes `applied_voltage` and `joint_states`; for each measured angle it publishes
+`predicted_joint_states` with the same stamp, and `model_residual`, measured less predicted. The
+prediction uses the applied voltage alone, never the measured angle, so that the residual shows the
+model's error as it grows.
+
+When the bridge's ``~/initialise`` has heated and cooled the muscle, call this node's ``~/reset``.
+"""
+
+import dataclasses
+import math
+
+from rclpy.node import Node
+from sensor_msgs.msg import JointState, Temperature
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.nodes.diagnostics import Diagnostics, WARN
+from hysteresis_ros.nodes.parameters import GEOMETRY, MODEL, NAMES, Parameters, Spec
+from hysteresis_ros.nodes.qos import MEASUREMENTS
+from hysteresis_ros.nodes.reference import load_model, needs_ambient, read_angle, seconds
+from hysteresis_ros.nodes.running import run
+
+MONITORING = (
+    Spec('residual_limit', 0.1, 'Difference between measurement and model that is reported as a '
+         'warning', 'rad', 0.0, 3.2),
+)
+
+
+class MonitorNode(Node):
+    """
+    The node `model_monitor`.
+
+    Parameters
+    ----------
+    model : MuscleModel, optional
+        Used instead of the one that the parameter ``model_file`` names.
+    **options
+        For `rclpy.node.Node`, such as ``namespace`` or ``parameter_overrides``.
+    """
+
+    # The prediction is built on the geometry once: here it is given at start only.
+    PARAMETERS = MODEL + MONITORING + NAMES + tuple(
+        dataclasses.replace(spec, read_only=True) for spec in GEOMETRY)
+
+    def __init__(self, model=None, **options):
+        super().__init__('model_monitor', **options)
+        parameters = Parameters(self, self.PARAMETERS, check=BicepGeometry.from_mapping,
+                                changed=self._configure)
+        model = model or load_model(parameters['model_file'], parameters, self.get_logger())
+        self._observer = model.observer()
+        self._voltage = self._ambient = self._residual = math.nan
+        self._time = None
+        self._measured = self._predicted = 0
+        self._configure(parameters)
+        self._diagnostics = Diagnostics(
+            self, parameters['hardware_id'], self._values, 'following the arm')
+        self._prediction = self.create_publisher(
+            JointState, 'predicted_joint_states', MEASUREMENTS)
+        self._difference = self.create_publisher(Float64, 'model_residual', MEASUREMENTS)
+        self.create_subscription(Float64, 'applied_voltage', self._on_voltage, MEASUREMENTS)
+        self.create_subscription(
+            JointState, 'joint_states', self._on_joint_states, MEASUREMENTS)
+        if needs_ambient(model):
+            self.create_subscription(
+                Temperature, 'ambient_temperature', self._on_ambient, MEASUREMENTS)
+        self.create_service(Trigger, '~/reset', self._on_reset)
+
+    def _configure(self, parameters):
+        self._joint, self._limit = parameters['joint_name'], parameters['residual_limit']
+
+    def _on_voltage(self, message):
+        if math.isfinite(message.data):
+            self._voltage = message.data
+
+    def _on_ambient(self, message):
+        self._ambient = message.temperature
+
+    def _on_joint_states(self, message):
+        self._measured += 1
+        angle = read_angle(message, self._joint)
+        if angle is None or not math.isfinite(angle) or not math.isfinite(self._voltage):
+            return
+        time = seconds(message.header.stamp)
+        if self._time is not None and time < self._time:
+            self._diagnostics.set('clock', WARN, 'time went back: the prediction started again')
+            self._observer.reset()
+        elif self._time is not None:
+            self._diagnostics.clear('clock')
+        self._time = time
+        predicted = self._observer.step(time, self._voltage, self._ambient)
+        self._residual = angle - predicted
+        output = JointState(name=[self._joint], position=[predicted])
+        output.header.stamp = message.header.stamp
+        self._prediction.publish(output)
+        self._difference.publish(Float64(data=self._residual))
+        self._predicted += 1
+        self._judge()
+
+    def _judge(self):
+        if abs(self._residual) > self._limit:
+            self._diagnostics.set('residual', WARN, (
+                f'the arm is {self._residual:+.3f} rad off the model, more than '
+                f'{self._limit:g} rad; record a run and try `hysteresis diagnose`'))
+        # Half the limit: a residual near it is not to come and go with each sample.
+        elif abs(self._residual) <= 0.5 * self._limit:
+            self._diagnostics.clear('residual')
+
+    def _on_reset(self, request, response):
+        self._observer.reset()
+        self._time = None
+        response.success = True
+        response.message = 'memory wiped; the prediction starts from the cold arm'
+        self.get_logger().info(response.message)
+        return response
+
+    def _values(self):
+        return {'angles received': self._measured, 'angles predicted': self._predicted,
+                'applied voltage [V]': self._voltage, 'residual [rad]': self._residual}
+
+
+def main(args=None) -> int:
+    """Run the node."""
+    return run(MonitorNode, args)

@@ -1,0 +1,133 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes take from the model file and from the geometry in their parameters."""
+
+import dataclasses
+from collections.abc import Mapping
+
+from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
+from hysteresis_ros.errors import RangeError
+from hysteresis_ros.share import share_path
+
+# The model's effects move an angle by a few degrees; each pass leaves a few percent of that.
+PASSES = 6
+
+
+def load_model(path: str, values: Mapping, logger):
+    """
+    Load a model and give it the arm that the node's parameters describe.
+
+    Parameters
+    ----------
+    path : str
+        Model file; empty for the one that comes with the package.
+    values : mapping
+        The node's parameters, with the geometry.
+    logger : rclpy logger
+        Warned if the model was identified with another arm.
+
+    Returns
+    -------
+    MuscleModel
+
+    Raises
+    ------
+    ModelFileError
+        If it is no model file of this version.
+    OSError
+        If it cannot be read.
+    """
+    from hysteresis_ros.model import MuscleModel   # SciPy: not needed without a model
+    path = path or share_path('config/bicep_model.yaml')
+    model = MuscleModel.load(path)
+    geometry = BicepGeometry.from_mapping(values)
+    others = [] if model.geometry is None else [
+        f'{name} {other:g} instead of {getattr(geometry, name):g}'
+        for name, other in model.geometry.to_mapping().items()
+        if abs(other - getattr(geometry, name)) > 1e-9]
+    if others:
+        logger.warning(f'{path} is of another arm ({", ".join(others)}); the parameters count')
+    return dataclasses.replace(model, geometry=geometry)
+
+
+def needs_ambient(model) -> bool:
+    """Whether an effect of the model asks for the recorded ambient temperature."""
+    return any(effect.needs_column == 'ambient_temperature' for effect in model.effects)
+
+
+class ArmReference:
+    """
+    Between the arm's angle and what each muscle has to do.
+
+    Parameters
+    ----------
+    geometry : BicepGeometry
+        The arm.
+    model : MuscleModel, optional
+        Its effects of the arm and of the sensor are undone; none without it.
+    """
+
+    def __init__(self, geometry: BicepGeometry, model=None):
+        self._geometry = geometry
+        if model is None:
+            self.reference = self._probe = geometry.reference
+        else:
+            self.reference = model.controller().reference
+            # Friction makes a reference depend on the one before, so a search needs its own.
+            self._probe = model.controller().reference
+
+    def angle(self, length: float) -> float:
+        """
+        Angle [rad] for which `reference` gives the elongation `length` [m].
+
+        Raises
+        ------
+        RangeError
+            If the linkage cannot take it.
+        """
+        wanted = float(self._geometry.angle(length))
+        theta = wanted
+        for _ in range(PASSES):
+            theta += wanted - float(self._geometry.angle(self._probe(theta).length))
+        return theta
+
+
+def read_reference(message, muscle: str) -> Reference:
+    """
+    Take one muscle's reference out of a `sensor_msgs.msg.JointState`.
+
+    Parameters
+    ----------
+    message : JointState
+        Elongation [m] as position, force [N] as effort.
+    muscle : str
+        Name of the muscle.
+
+    Raises
+    ------
+    RangeError
+        If the message does not hold both numbers for this muscle, or they are not finite.
+    """
+    if muscle not in message.name:
+        raise RangeError(f'muscle_reference names {list(message.name)}, not {muscle!r}')
+    index = message.name.index(muscle)
+    if len(message.position) <= index or len(message.effort) <= index:
+        raise RangeError('muscle_reference lacks position (length) or effort (force)')
+    reference = Reference(message.position[index], message.effort[index])
+    if not all(abs(value) < float('inf') for value in reference):
+        raise RangeError(f'muscle_reference asks for {reference.length} m under '
+                         f'{reference.force} N; both have to be finite')
+    return reference
+
+
+def read_angle(message, joint: str) -> float | None:
+    """Take one joint's angle [rad] out of a `JointState`; None if the message has none."""
+    if joint not in message.name:
+        return None
+    index = message.name.index(joint)
+    return message.position[index] if index < len(message.position) else None
+
+
+def seconds(stamp) -> float:
+    """Return a `builtin_interfaces.msg.Time` in seconds."""
+    return stamp.sec + 1e-9 * stamp.nanosec
