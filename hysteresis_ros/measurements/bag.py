@@ -313,7 +313,7 @@ def trials(received, stamp, voltage, initialising):
     begins = np.flatnonzero(busy & ~np.concatenate(([False], busy[:-1])))
     for row in begins:
         # The board heats up at once, the status comes a moment later.
-        early = np.searchsorted(stamp, stamp[row] - HEATING_UP)
+        early = max(int(np.searchsorted(stamp, stamp[row] - HEATING_UP)) - 1, 0)
         changes = np.flatnonzero(np.diff(voltage[early:row + 1]) != 0) + early + 1
         if changes.size:
             busy[changes[-1]:row] = True
