@@ -1,21 +1,36 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Hysteresis operators, their exact inverses, and the cascade that couples them."""
+"""Hysteresis operators, their exact inverses, and the models that couple them."""
 
+from .additive import Additive
 from .areas import signed_areas
 from .base import HysteresisOperator, Inversion, operator_from_dict
+from .bouc_wen import BoucWen
 from .branch import Branch, PiecewiseQuadratic
+from .cascade import Cascade, linear_drive_model, linear_model
+from .coupled import Coupled, coupled_from_dict
 from .everett import cell_areas, cells
+from .linear import Linear
+from .play import PrandtlIshlinskii
 from .preisach import Preisach
 
 __all__ = [
+    'Additive',
+    'BoucWen',
     'Branch',
+    'Cascade',
+    'Coupled',
     'HysteresisOperator',
     'Inversion',
+    'Linear',
     'PiecewiseQuadratic',
+    'PrandtlIshlinskii',
     'Preisach',
     'cell_areas',
     'cells',
+    'coupled_from_dict',
+    'linear_drive_model',
+    'linear_model',
     'operator_from_dict',
     'signed_areas',
 ]

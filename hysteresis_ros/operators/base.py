@@ -17,6 +17,8 @@ import numpy as np
 from ..errors import ParameterError
 from .branch import Branch
 
+# Parameters beyond are refused, so that no product of two can overflow.
+LARGEST = 1e100
 # Differences of the output below this share of full scale are rounding, not a request.
 RESOLUTION = 1e-13
 
@@ -248,12 +250,47 @@ def numbers(values: Any, name: str) -> np.ndarray:
     return array
 
 
+def memory(state: Mapping[str, Any], operator: HysteresisOperator) -> tuple[float, bool, str]:
+    """
+    Check what every saved memory holds.
+
+    Returns
+    -------
+    input : float
+        The present input, inside the operator's range.
+    saturated : bool
+        Whether the committed input was outside.
+    where : str
+        How messages name the memory.
+
+    """
+    where = f'memory of a {operator.kind} operator'
+    if take(state, 'kind', where) != operator.kind:
+        raise ParameterError(f'{where}: kind is {state["kind"]!r} instead of {operator.kind!r}')
+    u = number(take(state, 'input', where), f'{where}: input')
+    if not operator.lower <= u <= operator.upper:
+        raise ParameterError(f'{where}: input {u} is outside of the range '
+                             f'{operator.lower} to {operator.upper}')
+    saturated = take(state, 'saturated', where)
+    if not isinstance(saturated, bool):
+        raise ParameterError(f'{where}: saturated is {saturated!r}, not true or false')
+    return u, saturated, where
+
+
 def input_range(lower: Any, upper: Any, where: str) -> tuple[float, float]:
     """Return a checked input range, lower below upper."""
     low, high = number(lower, f'{where}: lower'), number(upper, f'{where}: upper')
     if not low < high:
         raise ParameterError(f'{where}: lower {low} is not below upper {high}')
     return low, high
+
+
+def one_sign(values: np.ndarray, name: str) -> float:
+    """Return the sign of values, 1.0 if all are zero; ParameterError if they are mixed."""
+    if np.any(values < 0.0) and np.any(values > 0.0):
+        raise ParameterError(f'{name}: both signs, so the output would not follow the input one '
+                             'way; make all of them >= 0 or all <= 0')
+    return -1.0 if np.any(values < 0.0) else 1.0
 
 
 def sequence(u: Any) -> np.ndarray:

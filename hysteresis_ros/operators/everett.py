@@ -22,10 +22,8 @@ import math
 import numpy as np
 
 from ..errors import ParameterError
-from .base import numbers
+from .base import LARGEST, numbers
 
-# Values beyond are refused, so that no product inside can overflow.
-LARGEST = 1e100
 # Nodes closer than this share of the range are taken for a mistake.
 CLOSEST = 1e-12
 

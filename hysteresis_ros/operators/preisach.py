@@ -16,9 +16,10 @@ import numpy as np
 from ..errors import ParameterError
 from .areas import signed_areas
 from .base import (
-    HysteresisOperator, Inversion, RESOLUTION, number, numbers, sequence, take)
+    HysteresisOperator, Inversion, LARGEST, RESOLUTION, memory, number, numbers, one_sign,
+    sequence, take)
 from .branch import PiecewiseQuadratic
-from .everett import LARGEST, Everett, check_nodes
+from .everett import Everett, check_nodes
 from .staircase import MOST_CORNERS, beyond, check_corners, monotone_runs, thin
 
 # Monotone runs of fewer inputs than this are stepped through: arrays cost more to set up.
@@ -57,7 +58,7 @@ class Preisach(HysteresisOperator):
         self.weights = _check_weights(weights, len(self.nodes) - 1)
         self.bias = number(bias, 'Preisach bias')
         self.lower, self.upper = float(self.nodes[0]), float(self.nodes[-1])
-        self._sign = -1.0 if np.any(self.weights < 0.0) else 1.0
+        self._sign = one_sign(self.weights, 'Preisach weights')
         # The output is base + sign * z with z from 0, all relays down, to span, all up.
         self._everett = Everett(self.nodes, 2.0 * np.abs(self.weights))
         self._span = self._everett.total
@@ -204,10 +205,11 @@ class Preisach(HysteresisOperator):
         if not np.all(np.isfinite(u)):
             return super().simulate(u)
         outputs = np.empty(len(u))
-        for start, stop, rising in monotone_runs(np.clip(u, self.lower, self.upper), self.input):
+        inside = np.clip(u, self.lower, self.upper)
+        for start, stop, rising in monotone_runs(inside, self.input):
             # The last input of a run is a scalar step in any case: that keeps the memory.
             if stop - start > _WORTH_AN_ARRAY:
-                outputs[start:stop - 1] = self._along(u[start:stop - 1], rising)
+                outputs[start:stop - 1] = self._along(inside[start:stop - 1], rising)
                 start = stop - 1
             for n in range(start, stop):
                 outputs[n] = self.step(float(u[n]))
@@ -216,7 +218,6 @@ class Preisach(HysteresisOperator):
     def _along(self, u: np.ndarray, increasing: bool) -> np.ndarray:
         """Return the outputs of a monotone run of inputs that starts at the present one."""
         bases, levels, thresholds = self._ladder(increasing)
-        u = np.clip(u, self.lower, self.upper)
         k = np.searchsorted(thresholds, u if increasing else -u, side='right')
         if increasing:
             z = levels[k] + self._everett.value(u, bases[k])
@@ -328,14 +329,8 @@ class Preisach(HysteresisOperator):
             If it is no memory of a Preisach operator on this input range.
 
         """
-        where = 'memory of a Preisach operator'
-        if take(state, 'kind', where) != self.kind:
-            raise ParameterError(f'{where}: kind is {state["kind"]!r} instead of {self.kind!r}')
-        u = number(take(state, 'input', where), f'{where}: input')
+        u, saturated, where = memory(state, self)
         corners = numbers(take(state, 'corners', where), f'{where}: corners').tolist()
-        saturated = take(state, 'saturated', where)
-        if not isinstance(saturated, bool):
-            raise ParameterError(f'{where}: saturated is {saturated!r}, not true or false')
         corners = check_corners(corners, u, self.lower, self.upper, where)
         sums = [self._span, 0.0]
         for k in range(2, len(corners)):
@@ -370,14 +365,10 @@ class Preisach(HysteresisOperator):
 
 
 def _check_weights(weights: np.ndarray, levels: int) -> np.ndarray:
-    """Return weights of one sign as a checked array."""
+    """Return weights, one a cell, as a checked array."""
     array = numbers(weights, 'Preisach weights')
     if len(array) != levels * (levels + 1) // 2:
         raise ParameterError(
             f'Preisach weights: {len(array)} given, {levels} levels have '
             f'{levels * (levels + 1) // 2} cells')
-    if np.any(array < 0.0) and np.any(array > 0.0):
-        raise ParameterError(
-            'Preisach weights: both signs, so the output would not follow the input one way; '
-            'make all of them >= 0 or all <= 0')
     return array
