@@ -19,6 +19,9 @@ ROS := $(if $(filter jazzy,$(ROS_DISTRO)),$(shell \
 ifeq ($(ROS),sourced)
 EXTRAS := test,bags
 else
+ifeq ($(ROS_DISTRO),jazzy)
+$(info ROS 2 Jazzy is sourced, but $(PYTHON) cannot import rclpy: its wheels are used.)
+endif
 EXTRAS := test,bags,ros
 unexport PYTHONPATH AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH
 endif
@@ -58,8 +61,14 @@ help:
 	@echo 'PYTHON= chooses the interpreter, CONSTRAINTS= a pip constraints file,'
 	@echo 'DEMO_ARGS= the options of `hysteresis demo`, PYTEST_ARGS= those of pytest.'
 
+# An environment holds absolute paths, so a moved checkout needs a new one, as another Python does.
+IDENTITY := $(CURDIR) $(PYTHON) $(EXTRAS) $(CONSTRAINTS)
+ifneq ($(strip $(shell cat $(VENV)/identity 2>/dev/null)),$(strip $(IDENTITY)))
+$(VENV)/made: force
+endif
+
 $(VENV)/made: setup.py tools/environment.sh tools/requirements.py $(wildcard $(CONSTRAINTS))
-	@tools/environment.sh "$(PYTHON)" $(VENV) $(EXTRAS) $(CONSTRAINTS)
+	@tools/environment.sh '$(IDENTITY)' $(PYTHON) $(VENV) $(EXTRAS) $(CONSTRAINTS)
 	@touch $@
 
 # Changes when a source appears or goes, which no file's time shows.

@@ -1,12 +1,13 @@
 #!/bin/sh
 # Makes a virtual environment, or brings one up to date, with all that the package needs.
 #
-#   tools/environment.sh PYTHON FOLDER EXTRAS [CONSTRAINTS]
+#   tools/environment.sh IDENTITY PYTHON FOLDER EXTRAS [CONSTRAINTS]
 #
+# IDENTITY is a line that says what the environment depends on: when it changes, it is made anew.
 # EXTRAS are extras of setup.py, comma-separated. With `ros` among them, ROS 2 comes as wheels;
 # without, the environment sees the machine's own packages, ROS 2 among them.
 set -eu
-python=$1 folder=$2 extras=$3 constraints=${4:-}
+identity=$1 python=$2 folder=$3 extras=$4 constraints=${5:-}
 
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 10))' || {
     echo "$python does not run or is older than Python 3.10: name another one with PYTHON=" >&2
@@ -22,8 +23,6 @@ case ,$extras, in
     *) sight=--system-site-packages ;;
 esac
 
-# An environment holds absolute paths, so a moved checkout needs a new one, as another Python does.
-identity="$PWD $python $("$python" -c 'import sys; print(sys.version)') $extras $constraints"
 if [ "$(cat "$folder/identity" 2>/dev/null)" != "$identity" ]; then
     echo "Making $folder: a minute or two, once."
     rm -rf "$folder"
