@@ -1,0 +1,56 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How benchmarks are found and joined; what they measure is not asked here."""
+
+import json
+import math
+
+from benchmark.__main__ import discover, main, merge
+import pytest
+
+from hysteresis_ros.errors import HysteresisError
+
+
+def test_results_are_joined_in_order():
+    """One flat mapping of numbers."""
+    results = {}
+    merge(results, {'step_us': 1})
+    merge(results, {'error_percent': 0.25})
+    assert list(results.items()) == [('step_us', 1.0), ('error_percent', 0.25)]
+
+
+def test_a_name_stands_for_one_number():
+    """Two benchmarks cannot overwrite each other."""
+    with pytest.raises(HysteresisError, match='step_us is measured twice'):
+        merge({'step_us': 1.0}, {'step_us': 2.0})
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf])
+def test_a_number_has_to_be_finite(value):
+    """JSON knows neither."""
+    with pytest.raises(HysteresisError, match='finite'):
+        merge({}, {'step_us': value})
+
+
+def test_every_module_offers_a_benchmark():
+    """What is named in the way that the page says is found."""
+    functions = discover()
+    assert functions
+    assert all(function.__name__.endswith('_benchmarks') for function in functions)
+
+
+def test_the_file_holds_one_flat_mapping(monkeypatch, tmp_path, capsys):
+    """Names to numbers, and the same on the terminal."""
+    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda: {'a_us': 2, 'b': 0.5}])
+    assert main(str(tmp_path / 'benchmark.json')) == 0
+    content = json.loads((tmp_path / 'benchmark.json').read_text(encoding='utf-8'))
+    assert content == {'a_us': 2.0, 'b': 0.5}
+    assert 'a_us' in capsys.readouterr().out
+
+
+def test_a_failing_benchmark_is_told_in_one_line(monkeypatch, tmp_path, capsys):
+    """No file is written, and the exit status says so."""
+    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda: {'a': math.nan}])
+    assert main(str(tmp_path / 'benchmark.json')) == 1
+    assert not (tmp_path / 'benchmark.json').exists()
+    assert capsys.readouterr().err.count('\n') == 1
