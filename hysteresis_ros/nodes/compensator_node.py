@@ -72,7 +72,8 @@ class CompensatorNode(Node):
         self._integral = AngleFeedback()
         self._timer = None
         self._ambient = math.nan
-        self._received = self._published = self._repeated = self._refused = 0
+        self._received = self._published = self._refused = self._repeated = 0
+        self._corrections = 0
         self._forget()
         self._publisher = self.create_publisher(Float64, 'voltage_setpoint', COMMANDS)
         self._diagnostics = Diagnostics(
@@ -123,7 +124,7 @@ class CompensatorNode(Node):
             return
         self._diagnostics.clear('reference')
         self._wanted, self._target = wanted, target
-        self._apply(self._corrected(wanted))
+        self._published += self._apply(self._corrected(wanted))
 
     def _corrected(self, wanted):
         """Return the reference with the feedback's correction of the angle."""
@@ -138,6 +139,7 @@ class CompensatorNode(Node):
         return Reference(float(self._geometry.length(after)), float(wanted.force + force))
 
     def _apply(self, reference):
+        """Publish the voltage for a reference and return whether there was one."""
         try:
             setpoint = self._controller.setpoint(
                 reference.length, reference.force, self._now(), ambient=self._ambient)
@@ -146,10 +148,9 @@ class CompensatorNode(Node):
         except HysteresisError as error:
             self._refused += 1
             self._diagnostics.set('setpoint', ERROR, f'no setpoint: {error}')
-            return
+            return False
         self._diagnostics.clear('setpoint')
         self._publish(setpoint.voltage)
-        self._published += 1
         if setpoint.saturated:
             # Expected too short: a larger angle is still possible, a smaller one is not.
             self._saturated = -1 if setpoint.error > 0.0 else 1
@@ -158,10 +159,10 @@ class CompensatorNode(Node):
         else:
             self._saturated = 0
             self._diagnostics.clear('saturated')
+        return True
 
     def _publish(self, voltage):
         self._publisher.publish(Float64(data=voltage))
-        self._voltage = voltage
         if self._timer is not None:
             self._timer.reset()
 
@@ -178,7 +179,7 @@ class CompensatorNode(Node):
         correction = self._integral.step(
             seconds(message.header.stamp), angle, self._target, self._saturated)
         if correction != before:
-            self._apply(self._corrected(self._wanted))
+            self._corrections += self._apply(self._corrected(self._wanted))
 
     def _on_ambient(self, message):
         self._ambient = message.temperature
@@ -194,7 +195,8 @@ class CompensatorNode(Node):
 
     def _counts(self):
         return {'references received': self._received, 'setpoints published': self._published,
-                'setpoints repeated': self._repeated, 'references refused': self._refused,
+                'references refused': self._refused, 'setpoints repeated': self._repeated,
+                'feedback corrections': self._corrections,
                 'feedback correction [rad]': self._integral.correction}
 
 

@@ -55,7 +55,7 @@ class MonitorNode(Node):
         model = model or load_model(parameters['model_file'], parameters, self.get_logger())
         self._observer = model.observer()
         self._voltage = self._ambient = self._residual = math.nan
-        self._time = None
+        self._start = self._time = None
         self._measured = self._predicted = 0
         self._configure(parameters)
         self._diagnostics = Diagnostics(
@@ -74,6 +74,10 @@ class MonitorNode(Node):
     def _configure(self, parameters):
         self._joint, self._limit = parameters['joint_name'], parameters['residual_limit']
 
+    def _forget(self):
+        self._observer.reset()
+        self._start = self._time = None
+
     def _on_voltage(self, message):
         if math.isfinite(message.data):
             self._voltage = message.data
@@ -89,11 +93,13 @@ class MonitorNode(Node):
         time = seconds(message.header.stamp)
         if self._time is not None and time < self._time:
             self._diagnostics.set('clock', WARN, 'time went back: the prediction started again')
-            self._observer.reset()
+            self._forget()
         elif self._time is not None:
             self._diagnostics.clear('clock')
+        if self._start is None:
+            self._start = time
         self._time = time
-        predicted = self._observer.step(time, self._voltage, self._ambient)
+        predicted = self._observer.step(time - self._start, self._voltage, self._ambient)
         self._residual = angle - predicted
         output = JointState(name=[self._joint], position=[predicted])
         output.header.stamp = message.header.stamp
@@ -112,8 +118,7 @@ class MonitorNode(Node):
             self._diagnostics.clear('residual')
 
     def _on_reset(self, request, response):
-        self._observer.reset()
-        self._time = None
+        self._forget()
         response.success = True
         response.message = 'memory wiped; the prediction starts from the cold arm'
         self.get_logger().info(response.message)

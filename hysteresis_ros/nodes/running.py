@@ -44,6 +44,10 @@ def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
         pass
     except (HysteresisError, OSError) as error:
         status = _fail(error)
+    except RuntimeError:
+        # SIGTERM while the node is being made: rclpy is shut down already and refuses the rest.
+        if rclpy.ok():
+            raise
     finally:
         _ignore_signals()
         status = _end(node) or status

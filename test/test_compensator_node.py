@@ -1,0 +1,262 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The node hysteresis_compensator: muscle reference to voltage, with memory and feedback."""
+
+import dataclasses
+import math
+
+from node_support import GEOMETRY_OF_TESTS, Graph, small_model
+import numpy as np
+import pytest
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.nodes.compensator_node import CompensatorNode
+from hysteresis_ros.nodes.feedback import AngleFeedback
+
+# Angles that the small muscle of the tests reaches.
+LOW, HIGH = 1.5, 1.95
+
+
+@pytest.fixture
+def graph(domain_id):
+    """Give a test a ROS graph of its own."""
+    with Graph(domain_id) as graph:
+        yield graph
+
+
+def message(length, force, name='muscle'):
+    """Return a muscle reference."""
+    return JointState(name=[name], position=[length], effort=[force])
+
+
+class Muscle:
+    """The node between a publisher of references and a list of voltages."""
+
+    def __init__(self, graph, model=None, **parameters):
+        self._graph = graph
+        self.node = graph.make(CompensatorNode, model or small_model(), **parameters)
+        self._setpoints = graph.collect(Float64, 'voltage_setpoint')
+        self.statuses = graph.status()
+        self._references = graph.publisher(JointState, 'muscle_reference')
+        graph.listening(self.node, 'voltage_setpoint', '/diagnostics')
+
+    @property
+    def voltages(self):
+        """All voltages so far."""
+        return [setpoint.data for setpoint in self._setpoints]
+
+    def ask(self, *angles):
+        """Publish the references of these angles."""
+        for angle in angles:
+            self._references.publish(message(*GEOMETRY_OF_TESTS.reference(angle)))
+
+    def send(self, reference):
+        """Publish a message as it is."""
+        self._references.publish(reference)
+
+    def wait(self, count):
+        """Wait for so many voltages and return them."""
+        self._graph.until(lambda: len(self._setpoints) >= count, f'{count} setpoints')
+        return self.voltages[:count]
+
+    def status(self, level):
+        """Wait for a status of this level and return it."""
+        self._graph.until(lambda: self.statuses and self.statuses[-1].level == level,
+                          f'a status of level {level}')
+        return self.statuses[-1]
+
+    def reset(self):
+        """Call the service."""
+        assert self._graph.call(Trigger, 'hysteresis_compensator/reset', Trigger.Request()).success
+
+
+def offline(angles, limits=(0.0, 6.0), model=None):
+    """Return the voltages of the inverse model without ROS."""
+    controller = (model or small_model()).controller(voltage_limits=limits)
+    return [controller.setpoint(*GEOMETRY_OF_TESTS.reference(angle)).voltage for angle in angles]
+
+
+def wave(count, seed=1):
+    """Return random angles within reach."""
+    return np.random.default_rng(seed).uniform(LOW, HIGH, count).tolist()
+
+
+def test_references_in_order_move_the_memory_once_each(graph):
+    """A burst comes out complete, in order, and as the inverse model without ROS has it."""
+    muscle = Muscle(graph)
+    angles = wave(300)
+    muscle.ask(*angles)
+    assert muscle.wait(300) == pytest.approx(offline(angles), abs=1e-12)
+    assert min(np.ptp(muscle.voltages), 1.0) == 1.0
+
+
+def test_repeating_does_not_move_the_memory(graph):
+    """The last voltage comes again and again; the next reference finds the memory as it was."""
+    muscle = Muscle(graph, republish_period=0.02)
+    angles = wave(4)
+    expected = offline(angles)
+    for angle, voltage in zip(angles, expected):
+        before = len(muscle.voltages)
+        muscle.ask(angle)
+        graph.until(lambda: len(muscle.voltages) >= before + 5, 'repeated setpoints')
+        # A repeat of the old voltage may still have been on its way.
+        assert muscle.voltages[-1] == pytest.approx(voltage, abs=1e-12)
+    assert len(set(muscle.voltages)) == 4
+
+
+def test_no_setpoint_before_the_first_reference_and_no_repeats_with_zero(graph):
+    """Nothing is invented."""
+    muscle = Muscle(graph, republish_period=0.0)
+    graph.spin(0.2)
+    assert muscle.voltages == []
+    muscle.ask(1.7)
+    muscle.wait(1)
+    graph.spin(0.3)
+    assert len(muscle.voltages) == 1
+
+
+def test_repeat_period_changes_at_run_time(graph):
+    """Off and on again, without a restart that would forget the muscle's history."""
+    muscle = Muscle(graph, republish_period=0.0)
+    muscle.ask(1.7)
+    muscle.wait(1)
+    parameter = Parameter('republish_period', value=0.02).to_parameter_msg()
+    assert graph.call(SetParameters, 'hysteresis_compensator/set_parameters',
+                      SetParameters.Request(parameters=[parameter])).results[0].successful
+    muscle.wait(5)
+    assert len(set(muscle.voltages)) == 1
+
+
+def test_reset_forgets_the_history_and_the_setpoint(graph):
+    """After heating and cooling the same reference gets the voltage of a cold muscle."""
+    muscle = Muscle(graph, republish_period=0.02)
+    angles = [1.9, 1.5, 1.7]
+    muscle.ask(*angles)
+    graph.until(lambda: len(muscle.voltages) > 5, 'repeats')
+    muscle.reset()
+    graph.spin(0.1)
+    count = len(muscle.voltages)
+    graph.spin(0.2)
+    assert len(muscle.voltages) == count
+    muscle.ask(1.7)
+    muscle.wait(count + 1)
+    fresh = offline([1.7])[0]
+    assert muscle.voltages[-1] == pytest.approx(fresh, abs=1e-12)
+    assert abs(fresh - offline(angles)[-1]) > 1e-3
+
+
+def test_reference_out_of_reach_is_saturated_with_the_expected_error(graph):
+    """Nearest voltage within the limits, said in the diagnostics, gone with the next good one."""
+    muscle = Muscle(graph, maximum_voltage=5.0)
+    muscle.ask(1.2)
+    assert muscle.wait(1) == [5.0]
+    status = muscle.status(b'\1')
+    expected = small_model().controller(voltage_limits=(0.0, 5.0)).setpoint(
+        *GEOMETRY_OF_TESTS.reference(1.2))
+    assert 'out of reach within 0 to 5' in status.message
+    assert f'error {1e3 * expected.error:+.3f} mm' in status.message
+    assert expected.error > 1e-3
+    muscle.ask(1.9)
+    muscle.status(b'\0')
+    # The memory has to hold what was applied, not what was asked for.
+    assert muscle.wait(2)[1] == pytest.approx(offline([1.2, 1.9], (0.0, 5.0))[1], abs=1e-12)
+
+
+@pytest.mark.parametrize('wrong, words', [
+    (message(math.nan, 6.0), 'finite'), (message(0.0, math.inf), 'finite'),
+    (message(-0.01, 6.0, 'other'), "names ['other'], not 'muscle'"),
+    (JointState(name=['muscle'], position=[-0.01]), 'lacks position (length) or effort'),
+    (JointState(), 'names []')])
+def test_wrong_reference_is_not_followed(graph, wrong, words):
+    """No voltage comes of it, the reason is in the diagnostics, the counts agree."""
+    muscle = Muscle(graph, republish_period=0.0)
+    muscle.ask(1.6)
+    muscle.send(wrong)
+    assert words in muscle.status(b'\1').message
+    muscle.ask(1.8)
+    assert muscle.wait(2) == pytest.approx(offline([1.6, 1.8]), abs=1e-12)
+    values = {pair.key: pair.value for pair in muscle.status(b'\0').values}
+    graph.until(lambda: len(muscle.voltages) == 2, 'two setpoints')
+    assert values['references refused'] == '1'
+    assert int(values['references received']) == 1 + int(values['setpoints published']) + 1
+
+
+def test_overdriving_needs_repeats():
+    """The horizon is served by the repeats, so they must be on."""
+    values = {spec.name: spec.default for spec in CompensatorNode.PARAMETERS}
+    from hysteresis_ros.nodes import compensator_node
+    compensator_node._check({**values, 'horizon': 0.5})
+    for horizon, period in ((1.0, 0.0), (0.4, 0.5)):
+        with pytest.raises(ParameterError, match='republish_period'):
+            compensator_node._check({**values, 'horizon': horizon, 'republish_period': period})
+
+
+class Arm:
+    """A virtual arm in joint_states: the model's own prediction, with another payload."""
+
+    def __init__(self, graph, muscle, grams):
+        other = dataclasses.replace(GEOMETRY_OF_TESTS, payload_mass=0.1 + 1e-3 * grams)
+        self._observer = dataclasses.replace(small_model(), geometry=other).observer()
+        self._publisher = graph.publisher(JointState, 'joint_states')
+        self._graph, self._muscle = graph, muscle
+        self._time = 0
+        self.angle = math.nan
+
+    def advance(self, seconds):
+        """Let the arm come to rest and publish its angle, once a second."""
+        for _ in range(seconds):
+            self._time += 1
+            self.angle = self._observer.step(float(self._time), self._muscle.voltages[-1])
+            state = JointState(name=['elbow'], position=[self.angle], velocity=[0.0])
+            state.header.stamp.sec = self._time
+            self._publisher.publish(state)
+            self._graph.spin(0.01)
+
+
+def test_feedback_takes_out_what_the_model_does_not_know(graph):
+    """20 g more than the model's: without feedback the arm hangs too low, with it it does not."""
+    muscle = Muscle(graph, feedback=True, republish_period=0.0)
+    muscle.ask(1.7)
+    first, = muscle.wait(1)
+    arm = Arm(graph, muscle, 20.0)
+    arm.advance(1)
+    assert arm.angle - 1.7 > 0.02
+    arm.advance(60)
+    assert abs(arm.angle - 1.7) < 0.006
+    assert 1 < len(muscle.voltages) <= 61
+    assert muscle.voltages[-1] > first
+    values = {pair.key: pair.value for pair in muscle.status(b'\0').values}
+    assert values['references received'] == values['setpoints published'] == '1'
+
+
+def test_feedback_integral():
+    """Rate, dead band, limit, the moving arm, and time that stands still or jumps."""
+    feedback = AngleFeedback(gain=0.1, limit=0.05, rest_speed=0.01, dead_band=0.002, period=1.0)
+    assert feedback.step(10.0, 1.0, 1.1) == 0.0
+    assert feedback.step(11.0, 1.0, 1.1) == pytest.approx(0.01)
+    assert feedback.step(11.5, 1.0, 1.1) == pytest.approx(0.01)
+    assert feedback.step(13.0, 1.0, 1.1) == pytest.approx(0.03)
+    assert feedback.step(14.0, 1.02, 1.1) == pytest.approx(0.03)     # on its way
+    assert feedback.step(15.0, 1.025, 1.1) == pytest.approx(0.0375)
+    assert feedback.step(16.0, math.nan, 1.1) == pytest.approx(0.0375)
+    assert feedback.step(17.0, 1.025, 1.026) == pytest.approx(0.0375)   # dead band
+    assert feedback.step(900.0, 1.025, 1.1) == 0.05
+    assert feedback.step(2.0, 1.025, 1.1) == 0.05      # clock set back
+    assert feedback.step(3.0, 1.025, 0.925) == pytest.approx(0.04)
+    feedback.reset()
+    assert feedback.correction == 0.0
+
+
+@pytest.mark.parametrize('saturated, error, change', [
+    (0, 0.1, 0.01), (0, -0.1, -0.01), (1, 0.1, 0.0), (1, -0.1, -0.01), (-1, 0.1, 0.01),
+    (-1, -0.1, 0.0)])
+def test_feedback_does_not_wind_up(saturated, error, change):
+    """At a limit the integral moves only away from it."""
+    feedback = AngleFeedback(gain=0.1, limit=1.0, rest_speed=0.01, dead_band=0.002, period=1.0)
+    feedback.step(0.0, 1.0, 1.0 + error)
+    assert feedback.step(1.0, 1.0, 1.0 + error, saturated) == pytest.approx(change)

@@ -1,0 +1,125 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The node model_monitor: the model beside the arm."""
+
+import math
+
+from node_support import Graph, small_model
+import pytest
+from sensor_msgs.msg import JointState, Temperature
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from hysteresis_ros.effects import catalogue
+from hysteresis_ros.nodes.monitor_node import MonitorNode
+
+
+@pytest.fixture
+def graph(domain_id):
+    """Give a test a ROS graph of its own."""
+    with Graph(domain_id) as graph:
+        yield graph
+
+
+class Monitor:
+    """The node between publishers of measurements and lists of what it says of them."""
+
+    def __init__(self, graph, model=None, **parameters):
+        self._graph = graph
+        self.node = graph.make(MonitorNode, model or small_model(), **parameters)
+        self.predictions = graph.collect(JointState, 'predicted_joint_states')
+        self.residuals = graph.collect(Float64, 'model_residual')
+        self.statuses = graph.status()
+        self._voltage = graph.publisher(Float64, 'applied_voltage')
+        self._state = graph.publisher(JointState, 'joint_states')
+        graph.listening(self.node, 'predicted_joint_states', 'model_residual', '/diagnostics')
+
+    def measure(self, second, voltage, angle, name='elbow'):
+        """Publish one sample of the voltage, then of the angle."""
+        received = self.node._measured
+        self._voltage.publish(Float64(data=voltage))
+        self._graph.until(lambda: self.node._voltage == voltage or math.isnan(voltage),
+                          'the voltage')
+        state = JointState(name=[name], position=[angle])
+        state.header.stamp.sec = second
+        self._state.publish(state)
+        self._graph.until(lambda: self.node._measured > received, 'the angle')
+
+    def wait(self, count):
+        """Wait for so many predictions and return the predicted angles."""
+        self._graph.until(
+            lambda: min(len(self.predictions), len(self.residuals)) >= count,
+            f'{count} predictions')
+        return [prediction.position[0] for prediction in self.predictions]
+
+
+def test_prediction_and_residual(graph):
+    """The observer's angle with the measurement's stamp; the residual is measured less that."""
+    monitor = Monitor(graph)
+    observer = small_model().observer()
+    run = [(1, 0.0, 2.0), (2, 3.0, 1.9), (3, 6.0, 1.4), (4, 4.0, 1.5), (5, 4.0, 1.5)]
+    expected = []
+    for second, voltage, angle in run:
+        monitor.measure(second, voltage, angle)
+        expected.append(observer.step(float(second), voltage))
+    assert monitor.wait(5) == pytest.approx(expected, abs=1e-12)
+    assert [residual.data for residual in monitor.residuals] == pytest.approx(
+        [angle - prediction for (_, _, angle), prediction in zip(run, expected)], abs=1e-12)
+    assert [prediction.header.stamp.sec for prediction in monitor.predictions] == [1, 2, 3, 4, 5]
+    assert monitor.predictions[0].name == ['elbow']
+
+
+def test_nothing_is_predicted_without_voltage_or_angle(graph):
+    """Neither NaN nor another joint nor a missing voltage makes a prediction."""
+    monitor = Monitor(graph)
+    monitor.measure(1, math.nan, 2.0)
+    monitor.measure(2, 3.0, math.nan)
+    monitor.measure(3, 3.0, 2.0, name='shoulder')
+    monitor.measure(4, 3.0, 2.0)
+    monitor.wait(1)
+    assert [prediction.header.stamp.sec for prediction in monitor.predictions] == [4]
+    assert math.isfinite(monitor.residuals[0].data)
+
+
+def test_reset_and_a_clock_that_goes_back_start_from_the_cold_arm(graph):
+    """The memory of the prediction is wiped with the muscle's."""
+    monitor = Monitor(graph)
+    cold = small_model().observer().step(1.0, 3.0)
+    for second, voltage in ((1, 3.0), (2, 6.0), (3, 3.0)):
+        monitor.measure(second, voltage, 1.7)
+    assert monitor.wait(3)[0] == pytest.approx(cold, abs=1e-12)
+    assert abs(monitor.wait(3)[2] - cold) > 1e-3
+    assert graph.call(Trigger, 'model_monitor/reset', Trigger.Request()).success
+    monitor.measure(4, 3.0, 1.7)
+    assert monitor.wait(4)[3] == pytest.approx(cold, abs=1e-12)
+    monitor.measure(5, 6.0, 1.7)
+    monitor.measure(1, 3.0, 1.7)
+    assert monitor.wait(6)[5] == pytest.approx(cold, abs=1e-12)
+    graph.until(lambda: 'time went back' in monitor.statuses[-1].message, 'the warning')
+
+
+def test_large_residual_is_a_warning(graph):
+    """It comes above the limit and goes below half of it."""
+    monitor = Monitor(graph, residual_limit=0.2)
+    predicted = small_model().observer().step(1.0, 3.0)
+    for second, off, level in ((1, 0.19, b'\0'), (2, -0.21, b'\1'), (3, 0.15, b'\1'),
+                               (4, 0.09, b'\0')):
+        monitor.measure(second, 3.0, predicted + off)
+        monitor.wait(second)
+        monitor.node._diagnostics.publish()
+        count = len(monitor.statuses)
+        graph.until(lambda: len(monitor.statuses) > count, 'a status')
+        assert monitor.statuses[-1].level == level, off
+
+
+def test_ambient_temperature_counts_where_the_model_knows_it(graph):
+    """A warmer room is a shorter muscle, if the model has the effect."""
+    effect = catalogue()['ambient_temperature']
+    monitor = Monitor(graph, small_model([effect(small_model().surroundings, gain=0.4)]))
+    ambient = graph.publisher(Temperature, 'ambient_temperature')
+    monitor.measure(1, 3.0, 1.7)
+    ambient.publish(Temperature(temperature=35.0))
+    graph.until(lambda: monitor.node._ambient == 35.0, 'the temperature')
+    monitor.measure(2, 3.0, 1.7)
+    cool, warm = monitor.wait(2)
+    assert warm < cool
