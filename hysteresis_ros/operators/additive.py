@@ -6,7 +6,7 @@ from typing import Sequence
 
 import numpy as np
 
-from .base import HysteresisOperator, Inversion
+from .base import HysteresisOperator
 from .coupled import Coupled
 from ..errors import ParameterError
 
@@ -61,9 +61,9 @@ class Additive(Coupled):
         v, f = self.columns(inputs).T
         return load.simulate(f) - drive.simulate(v)
 
-    def _invert(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
-                slope_floors: Sequence[float]) -> Inversion:
+    def _solve(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
+               slope_floors: Sequence[float]) -> tuple[float, float, bool]:
         drive, load = self.stages
         level = load.peek(coupled[0])
-        found = drive.invert(level - y, dead_bands[0], slope_floors[0])
-        return Inversion(found.input, level - found.output, found.saturated)
+        v, reached, saturated = drive.solve(level - y, dead_bands[0], slope_floors[0])
+        return v, level - reached, saturated

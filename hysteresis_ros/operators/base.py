@@ -164,24 +164,30 @@ class HysteresisOperator(abc.ABC):
             Input, the output that it gives, and whether the request was out of reach.
 
         """
+        return Inversion(*self.solve(y, dead_band, slope_floor))
+
+    def solve(self, y: float, dead_band: float = 0.0,
+              slope_floor: float = 0.0) -> tuple[float, float, bool]:
+        """Return what `invert` does as a plain tuple, which is faster inside a control loop."""
         y = float(y)
         if not -math.inf < y < math.inf:
-            return Inversion(self.input, self.output, True)
-        found = self._invert(y)
+            return self.input, self.output, True
+        found = self._solve(y)
         if dead_band <= 0.0 and slope_floor <= 0.0:
             return found
-        move = found.input - self.input
+        u, output, saturated = found
+        move = u - self.input
         if move * self.direction <= 0.0 and abs(y - self.output) <= dead_band:
-            return Inversion(self.input, self.output, found.saturated)
-        change = abs(found.output - self.output)
+            return self.input, self.output, saturated
+        change = abs(output - self.output)
         if change < slope_floor * abs(move):
             u = self.input + math.copysign(change / slope_floor, move)
-            return Inversion(u, self.peek(u), found.saturated)
+            return u, self.peek(u), saturated
         return found
 
     @abc.abstractmethod
-    def _invert(self, y: float) -> Inversion:
-        """Solve for a finite request, exactly."""
+    def _solve(self, y: float) -> tuple[float, float, bool]:
+        """Solve for a finite request exactly: input, its output, whether out of reach."""
 
     @property
     @abc.abstractmethod
@@ -191,7 +197,7 @@ class HysteresisOperator(abc.ABC):
     @property
     @abc.abstractmethod
     def output_range(self) -> tuple[float, float]:
-        """Smallest and largest output that can be reached from any memory."""
+        """Smallest and largest output that the operator can give."""
 
     @abc.abstractmethod
     def to_dict(self) -> dict[str, Any]:

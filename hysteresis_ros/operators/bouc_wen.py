@@ -24,7 +24,7 @@ import numpy as np
 from scipy.special import hyp2f1, poch, psi
 
 from .base import (
-    HysteresisOperator, Inversion, LARGEST, RESOLUTION, input_range, memory, number, one_sign,
+    HysteresisOperator, LARGEST, RESOLUTION, input_range, memory, number, one_sign,
     take)
 from .branch import Branch
 from ..errors import ParameterError
@@ -88,7 +88,6 @@ class BoucWen(HysteresisOperator):
                         for k in range(4)]
         self.reset()
         ends = self.output, self.peek(self.upper)
-        # From any memory w goes to between what the cold state reaches and 1.
         if not max(map(abs, ends)) <= LARGEST:
             raise ParameterError(f'{where}: the output reaches beyond {LARGEST:g}, use another '
                                  'unit')
@@ -113,7 +112,13 @@ class BoucWen(HysteresisOperator):
 
     @property
     def output_range(self) -> tuple[float, float]:
-        """Outputs that the cold state and a rise from it to `upper` give."""
+        """
+        Outputs that the cold state and a rise from it to `upper` give.
+
+        No memory gives more, but some give less: the hidden state saturates over an input of
+        about 1 / rate, not at the ends of the range. The inverse flags what the present branch
+        cannot reach.
+        """
         return self._ends
 
     def _travel(self, w: float, gap: float) -> float:
@@ -138,6 +143,10 @@ class BoucWen(HysteresisOperator):
         if w < 0.5:
             return 1.0 - w ** self.exponent
         return -math.expm1(self.exponent * math.log1p(-gap)) if gap > 0.0 else 0.0
+
+    def _slope(self, w: float) -> float:
+        """Return d output / d input while rising, or while falling with -w for w."""
+        return self.stiffness + self.gain * self.rate * self._pace(w, 1.0 - w)
 
     def _reached(self, travel: float) -> float:
         """
@@ -199,19 +208,19 @@ class BoucWen(HysteresisOperator):
         """Return the smooth curve from the present input to the end of the range, one way."""
         return BoucWenBranch(self, increasing)
 
-    def _invert(self, y: float) -> Inversion:
+    def _solve(self, y: float) -> tuple[float, float, bool]:
         low, high = self._ends
         saturated = not low - self._tolerance <= y <= high + self._tolerance
         y = min(max(y, low), high)
         missing = self._sign * (y - self.output)
         if abs(missing) <= self._tolerance:
-            return Inversion(self.input, self.output, saturated)
-        u, output = self._solve(y, self.upper if missing > 0.0 else self.lower)
+            return self.input, self.output, saturated
+        u, output = self._seek(y, self.upper if missing > 0.0 else self.lower)
         # What the present branch cannot reach before the end of the range is out of reach.
         saturated = saturated or abs(output - y) > 10.0 * self._tolerance
-        return Inversion(u, output, saturated)
+        return u, output, saturated
 
-    def _solve(self, y: float, end: float) -> tuple[float, float]:
+    def _seek(self, y: float, end: float) -> tuple[float, float]:
         """
         Find the input between the present one and an end whose output is y, or comes nearest.
 
@@ -233,7 +242,7 @@ class BoucWen(HysteresisOperator):
                 near = u
             else:
                 far = u
-            slope = self.stiffness + self.gain * self.rate * self._pace(side * w, 1.0 - side * w)
+            slope = self._slope(side * w)
             u = u + error / slope if slope != 0.0 else far
             if not min(near, far) < u < max(near, far):
                 u = near + (far - near) / 2.0
@@ -305,8 +314,7 @@ class BoucWenBranch(Branch):
         side = 1.0 if self.increasing else -1.0
 
         def scalar(place: float) -> float:
-            w = operator._turned(place)
-            return operator.stiffness + operator.gain * operator.rate * operator._pace(side * w, 1.0 - side * w)
+            return operator._slope(side * operator._turned(place))
 
         u = np.clip(np.asarray(u, dtype=float), self.knots[0], self.knots[-1])
         return np.vectorize(scalar, otypes=[float])(u)[()]
@@ -321,6 +329,6 @@ class BoucWenBranch(Branch):
         def scalar(level: float) -> float:
             if side * (level - start) <= 0.0 or end == operator.input:
                 return operator.input
-            return operator._solve(level, end)[0]
+            return operator._seek(level, end)[0]
 
         return np.vectorize(scalar, otypes=[float])(np.asarray(y, dtype=float))[()]

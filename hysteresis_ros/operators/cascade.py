@@ -81,24 +81,20 @@ class Cascade(Coupled):
             y = stage.simulate(x - y)
         return y
 
-    def _invert(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
-                slope_floors: Sequence[float]) -> Inversion:
+    def _solve(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
+               slope_floors: Sequence[float]) -> tuple[float, float, bool]:
         """Invert the stages from the last to the first (Eqs. 13 and 14)."""
-        stages = self.stages
-        top = len(stages) - 1
-        target, output = y, self.output
-        saturated, exact = False, True
-        for k in range(top, -1, -1):
-            found = stages[k].invert(target, dead_bands[k], slope_floors[k])
-            saturated = saturated or found.saturated
-            if k == top:
-                output = found.output
-            elif not abs(found.output - target) <= self._slack[k]:
-                exact = False
-            if k:
-                target = coupled[k - 1] - found.input
-        drive = found.input
-        return Inversion(drive, output if exact else self.peek((drive, *coupled)), saturated)
+        stages, slack = self.stages, self._slack
+        k = len(stages) - 1
+        drive, output, saturated = stages[k].solve(y, dead_bands[k], slope_floors[k])
+        exact = True
+        while k:
+            target = coupled[k - 1] - drive
+            k -= 1
+            drive, reached, beyond = stages[k].solve(target, dead_bands[k], slope_floors[k])
+            saturated = saturated or beyond
+            exact = exact and -slack[k] <= reached - target <= slack[k]
+        return drive, output if exact else self.peek((drive, *coupled)), saturated
 
     def invert_force(self, force: float, dead_band: float = 0.0,
                      slope_floor: float = 0.0) -> Inversion:

@@ -40,6 +40,7 @@ class Coupled(abc.ABC):
         if len(set(map(id, self.stages))) != len(self.stages):
             raise ParameterError(f'{self.kind} model: two stages are the same object, but each '
                                  'needs a memory of its own')
+        self._off = (0.0,) * len(self.stages)
 
     @property
     @abc.abstractmethod
@@ -98,21 +99,23 @@ class Coupled(abc.ABC):
             and output, flagged as saturated.
 
         """
+        return Inversion(*self.solve(y, coupled, dead_bands, slope_floors))
+
+    def solve(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float] = (),
+              slope_floors: Sequence[float] = ()) -> tuple[float, float, bool]:
+        """Return what `invert` does as a plain tuple, which is faster inside a control loop."""
         if len(coupled) != len(self.stages) - 1:
             raise ParameterError(f'{self.kind} model: {len(coupled)} coupled inputs given, '
                                  f'{len(self.stages) - 1} needed')
-        if not (math.isfinite(y) and all(map(math.isfinite, coupled))):
-            return Inversion(self.stages[0].input, self.output, True)
-        return self._invert(y, coupled, dead_bands or self._off, slope_floors or self._off)
-
-    @property
-    def _off(self) -> tuple[float, ...]:
-        return (0.0,) * len(self.stages)
+        for value in (y, *coupled):
+            if not -math.inf < value < math.inf:
+                return self.stages[0].input, self.output, True
+        return self._solve(y, coupled, dead_bands or self._off, slope_floors or self._off)
 
     @abc.abstractmethod
-    def _invert(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
-                slope_floors: Sequence[float]) -> Inversion:
-        """Solve for finite requests."""
+    def _solve(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
+               slope_floors: Sequence[float]) -> tuple[float, float, bool]:
+        """Solve for finite requests: drive, its output, whether out of reach."""
 
     def columns(self, inputs: np.ndarray) -> np.ndarray:
         """Return inputs as a checked array of shape (M, S)."""

@@ -179,20 +179,39 @@ class Everett:
         """Return the interval that inputs lie in; a node belongs to the one above it."""
         return np.searchsorted(self.nodes[1:-1], u, side='right')
 
-    def alpha(self, target: float, beta: float, tolerance: float) -> float:
-        """Return the smallest alpha with E(alpha, beta) = target, to within the tolerance."""
-        nodes = self._list
-        b = bisect_right(self._inner, beta)
-        q = nodes[b + 1] - beta
-        first = self._half[b] * q * q
+    def alpha(self, target: float, beta: float, tolerance: float) -> tuple[float, float]:
+        """
+        Solve E(alpha, beta) = target for the smallest alpha.
+
+        Parameters
+        ----------
+        target : float
+            Sought value.
+        beta : float
+            The fixed corner.
+        tolerance : float
+            A value that falls short of the target by less counts as reaching it, so that
+            rounding does not send the solution across a plateau.
+
+        Returns
+        -------
+        alpha, value : float
+            The solution, or the last node if the target is beyond, and E there.
+
+        """
         if target <= tolerance:
-            return beta
+            return beta, 0.0
+        b = bisect_right(self._inner, beta)
+        q = self._list[b + 1] - beta
+        half = self._half[b]
+        first = half * q * q
         if target - tolerance <= first:
-            return beta + _root(target, 0.0, self._half[b], q)
+            p = min(math.sqrt(target / half), q)
+            return beta + p, half * p * p
         corners, columns = self._corner[b + 1], self._column[b]
         low, high = b + 1, self._levels
         if low == high:
-            return nodes[high]
+            return self._list[high], first
         sought = target - tolerance - first
         while high - low > 1:
             middle = (low + high) // 2
@@ -201,23 +220,30 @@ class Everett:
             else:
                 high = middle
         x, _, corner, row, column, cross, half, _ = self._cells[low][b]
-        rest = target - first - corner - column * q
-        return x + _root(rest, row + cross * q, half, nodes[low + 1] - x)
+        start = first + corner + column * q
+        slope = row + cross * q
+        p = _root(target - start, slope, half, self._list[high] - x)
+        return x + p, start + p * (slope + half * p)
 
-    def beta(self, target: float, alpha: float, tolerance: float) -> float:
-        """Return the largest beta with E(alpha, beta) = target, to within the tolerance."""
-        nodes = self._list
-        a = bisect_right(self._inner, alpha)
-        p = alpha - nodes[a]
-        first = self._half[a] * p * p
+    def beta(self, target: float, alpha: float, tolerance: float) -> tuple[float, float]:
+        """
+        Solve E(alpha, beta) = target for the largest beta.
+
+        As `alpha`, with the other corner fixed.
+        """
         if target <= tolerance:
-            return alpha
+            return alpha, 0.0
+        a = bisect_right(self._inner, alpha)
+        p = alpha - self._list[a]
+        half = self._half[a]
+        first = half * p * p
         if target - tolerance <= first:
-            return alpha - _root(target, 0.0, self._half[a], p)
+            q = min(math.sqrt(target / half), p)
+            return alpha - q, half * q * q
         corners, rows = self._corner_columns[a], self._row_columns[a]
         low, high = 0, a
         if low == high:
-            return nodes[low]
+            return self._list[low], first
         sought = target - tolerance - first
         while high - low > 1:
             middle = (low + high) // 2
@@ -226,8 +252,10 @@ class Everett:
             else:
                 low = middle
         _, x, corner, row, column, cross, _, half = self._cells[a][low]
-        rest = target - first - corner - row * p
-        return x - _root(rest, column + cross * p, half, x - nodes[low])
+        start = first + corner + row * p
+        slope = column + cross * p
+        q = _root(target - start, slope, half, x - self._list[low])
+        return x - q, start + q * (slope + half * q)
 
 
 def _root(rest: float, slope: float, bend: float, width: float) -> float:
@@ -235,7 +263,6 @@ def _root(rest: float, slope: float, bend: float, width: float) -> float:
     if rest <= 0.0:
         return 0.0
     denominator = slope + math.sqrt(slope * slope + 4.0 * bend * rest)
-    # 'not <' also catches the 0 / 0 of a weight so small that its square is lost.
-    if not 2.0 * rest < width * denominator:
-        return width
-    return 2.0 * rest / denominator
+    rest += rest
+    # Also where a weight is so small that its square is lost and the denominator is 0.
+    return rest / denominator if rest < width * denominator else width

@@ -8,7 +8,7 @@ from typing import Any, Mapping
 import numpy as np
 
 from .base import (
-    HysteresisOperator, Inversion, LARGEST, RESOLUTION, input_range, memory, number, sequence,
+    HysteresisOperator, LARGEST, RESOLUTION, input_range, memory, number, sequence,
     take)
 from .branch import PiecewiseQuadratic
 from ..errors import ParameterError
@@ -105,14 +105,14 @@ class Linear(HysteresisOperator):
         return PiecewiseQuadratic(knots, self._at(knots), np.full(pieces, self.slope),
                                   np.zeros(pieces), increasing)
 
-    def _invert(self, y: float) -> Inversion:
+    def _solve(self, y: float) -> tuple[float, float, bool]:
         low, high = self._ends
         saturated = not low - self._tolerance <= y <= high + self._tolerance
         y = min(max(y, low), high)
         if abs(y - self.output) <= self._tolerance:
-            return Inversion(self.input, self.output, saturated)
+            return self.input, self.output, saturated
         u = min(max((y - self.intercept) / self.slope, self.lower), self.upper)
-        return Inversion(u, self._at(u), saturated)
+        return u, self._at(u), saturated
 
     def save(self) -> dict[str, Any]:
         """Return the present input and its last movement."""

@@ -16,7 +16,7 @@ from typing import Any, Mapping, Sequence
 import numpy as np
 
 from .base import (
-    HysteresisOperator, Inversion, LARGEST, RESOLUTION, input_range, memory, number, numbers,
+    HysteresisOperator, LARGEST, RESOLUTION, input_range, memory, number, numbers,
     one_sign, sequence, take)
 from .branch import PiecewiseQuadratic
 from .staircase import monotone_runs
@@ -230,12 +230,12 @@ class PrandtlIshlinskii(HysteresisOperator):
         slopes = np.diff(values) / np.diff(knots)
         return PiecewiseQuadratic(knots, values, slopes, np.zeros_like(slopes), increasing)
 
-    def _invert(self, y: float) -> Inversion:
+    def _solve(self, y: float) -> tuple[float, float, bool]:
         low, high = self._ends
         saturated = not low - self._tolerance <= y <= high + self._tolerance
         y = min(max(y, low), high)
         if abs(y - self.output) <= self._tolerance:
-            return Inversion(self.input, self.output, saturated)
+            return self.input, self.output, saturated
         missing = self._sign * (self._unbend(y) - self._sum(self._plays))
         increasing = missing > 0.0
         missing = abs(missing)
@@ -252,7 +252,7 @@ class PrandtlIshlinskii(HysteresisOperator):
                 break
             missing -= rise
         found = min(max(found, self.lower), self.upper)
-        return Inversion(found, self.peek(found), saturated)
+        return found, self.peek(found), saturated
 
     def save(self) -> dict[str, Any]:
         """Return the memory: the present input and the places of the plays."""

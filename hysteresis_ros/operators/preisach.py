@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import ParameterError
 from .areas import signed_areas
 from .base import (
-    HysteresisOperator, Inversion, LARGEST, RESOLUTION, memory, number, numbers, one_sign,
+    HysteresisOperator, LARGEST, RESOLUTION, memory, number, numbers, one_sign,
     sequence, take)
 from .branch import PiecewiseQuadratic
 from .everett import Everett, check_nodes
@@ -278,7 +278,7 @@ class Preisach(HysteresisOperator):
         return PiecewiseQuadratic(
             knots, values, self._sign * slopes, self._sign * bends, increasing)
 
-    def _invert(self, y: float) -> Inversion:
+    def _solve(self, y: float) -> tuple[float, float, bool]:
         sign, base, tolerance = self._sign, self._base, self._tolerance
         target = sign * (y - base)
         saturated = False
@@ -290,7 +290,7 @@ class Preisach(HysteresisOperator):
             target = self._span
         change = target - self._z
         if -tolerance <= change <= tolerance:
-            return Inversion(self.input, self.output, saturated)
+            return self.input, self.output, saturated
 
         # Find the corner that the branch is measured from where it meets the target, and the
         # two corners between which it is measured from that one.
@@ -307,12 +307,16 @@ class Preisach(HysteresisOperator):
         passed = corners[depth] if depth < held else self.input
         coming = corners[depth - 2]
         if up:
-            u = self._everett.alpha(target - level, corner, tolerance)
-            u = min(max(u, passed), coming)
-            return Inversion(u, base + sign * (level + self._everett.at(u, corner)), saturated)
-        u = self._everett.beta(level - target, corner, tolerance)
-        u = max(min(u, passed), coming)
-        return Inversion(u, base + sign * (level - self._everett.at(corner, u)), saturated)
+            u, rise = self._everett.alpha(target - level, corner, tolerance)
+            if not passed <= u <= coming:
+                u = min(max(u, passed), coming)
+                rise = self._everett.at(u, corner)
+            return u, base + sign * (level + rise), saturated
+        u, fall = self._everett.beta(level - target, corner, tolerance)
+        if not coming <= u <= passed:
+            u = max(min(u, passed), coming)
+            fall = self._everett.at(corner, u)
+        return u, base + sign * (level - fall), saturated
 
     def save(self) -> dict[str, Any]:
         """Return the memory: the present input and the corners, outside in."""
