@@ -113,10 +113,22 @@ class Wire:
     ----------
     material : WireMaterial
         Constants of this specimen.
+
+    Attributes
+    ----------
+    retained : float
+        Share of the grains that stay martensite for good, as use makes them.
+    excess : float
+        Length that the wire has beyond its elongation: dead length, creep [m].
+    compliance : float
+        Of crimps and cable in series with the wire [m/N].
     """
 
     def __init__(self, material: WireMaterial):
         self.material = material
+        self.retained = 0.0
+        self.excess = 0.0
+        self.compliance = 0.0
         self._heating, self._cooling = material.grains.temperatures(
             material.grain_count, material.grain_offset)
         self._shift = 1.0 / (material.section * material.clausius_clapeyron)
@@ -149,6 +161,10 @@ class Wire:
     def martensite(self) -> float:
         """Martensite share after the last `commit`."""
         return self._martensite
+
+    def peek_martensite(self, temperature: float, tension: float) -> float:
+        """Return the martensite share at a temperature [degC] and tension [N]; memory stays."""
+        return self._grains.peek(temperature - self._shift * tension)
 
     def elongation(self, temperature: float, tension: float) -> float:
         """
@@ -200,5 +216,7 @@ class Wire:
 
     def _length(self, martensite: float, early: float, tension: float) -> float:
         material = self.material
+        martensite = self.retained + (1.0 - self.retained) * martensite
         strain = material.strain(martensite, early, tension / material.section)
-        return material.resting_length * (strain - self._rest)
+        return (material.resting_length * (strain - self._rest) + self.excess
+                + self.compliance * tension)

@@ -1,0 +1,266 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The robotic bicep as it lives: voltage in, encoder counts out, in its own time.
+
+In every step the heating warms the wires (Eq. 1), then wires and weights find their balance. The
+arm follows at once unless it has inertia; with friction it sticks until the wires overcome it.
+"""
+
+import collections
+import math
+
+import numpy as np
+
+from hysteresis_ros.laboratory import sensors
+from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.linkage import GEOMETRY, HIGHEST_ANGLE, LOWEST_ANGLE
+from hysteresis_ros.laboratory.muscle import Muscle
+from hysteresis_ros.laboratory.solve import increasing_root
+
+__all__ = ['Arm', 'GEOMETRY']
+
+LENGTH_TOLERANCE = 1e-7
+MOMENT_TOLERANCE = 2e-6
+# Steps in time [s] where the temperature feeds back on itself, and where the arm has inertia.
+COUPLED_STEP = 0.5
+INERTIAL_STEP = 0.02
+# Damping of the wires' own, over the critical one, where nothing else damps the arm.
+INNER_DAMPING = 0.03
+TYPICAL_STIFFNESS = 4.0
+
+
+class Arm:
+    """
+    One arm with its wires, in the state that its past has left.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        What this arm is really like.
+    seed : int or sequence of int
+        Of everything that is left to chance.
+
+    Attributes
+    ----------
+    time : float
+        Since the recording began [s].
+    angle : float
+        True angle of the forearm [rad].
+    temperature : float
+        Of the wires [degC].
+    tensions : list of float
+        Tension of each different wire [N].
+    """
+
+    def __init__(self, conditions: Conditions, seed=0):
+        self.conditions = conditions
+        self.muscle = Muscle(conditions)
+        self._chance = np.random.default_rng(seed)
+        self.time = 0.0
+        self.angle = 2.2
+        self.tensions = [5.0] * len(self.muscle.wires)
+        coupled = (conditions.heat.latent or conditions.resistance_growth or conditions.viscous
+                   or conditions.disturbances or conditions.creep)
+        self._settling_step = COUPLED_STEP if coupled else math.inf
+        self.heat_and_cool()
+
+    def heat_and_cool(self) -> None:
+        """Heat fully, cool, and let the arm hang: how every trial begins. Time stands still."""
+        self._fluctuation = 0.0
+        self.temperature = self._room()
+        self.muscle.heat_and_cool(self.temperature)
+        self._velocity = 0.0
+        self._settle_down()
+        self._played = self.angle
+        self._history = collections.deque([(self.time, self._seen())])
+
+    def advance(self, dt: float, voltage: float) -> None:
+        """
+        Let the arm live for `dt` [s] under a constant voltage [V].
+
+        Parameters
+        ----------
+        dt : float
+            Time; not negative.
+        voltage : float
+            RMS voltage at the board's output.
+        """
+        longest = INERTIAL_STEP if self.conditions.inertia > 0.0 else COUPLED_STEP
+        for step in _parts(dt, longest):
+            self._step(step, voltage, moving=self.conditions.inertia > 0.0)
+
+    def settle(self, hold: float, voltage: float) -> None:
+        """Let the arm come to rest under a voltage [V] held for `hold` [s]."""
+        for step in _parts(hold, self._settling_step):
+            self._step(step, voltage, moving=False)
+        self._velocity = 0.0
+        self._history.clear()
+        self._history.append((self.time, self._seen()))
+
+    @property
+    def measured_angle(self) -> float:
+        """Angle that reaches the encoder's counter now [rad], before it is counted."""
+        latency = self.conditions.latency
+        if latency <= 0.0 or len(self._history) == 1:
+            return self._history[-1][1]
+        wanted = self.time - latency
+        while len(self._history) > 2 and self._history[1][0] <= wanted:
+            self._history.popleft()
+        (before, low), (after, high) = self._history[0], self._history[1]
+        if wanted <= before or after <= before:
+            return low
+        return low + (high - low) * min((wanted - before) / (after - before), 1.0)
+
+    @property
+    def encoder_counts(self) -> int:
+        """Quadrature counts, 8192 a turn, from the upward vertical."""
+        return sensors.encoder_counts(self.measured_angle)
+
+    @property
+    def ambient_temperature(self) -> float:
+        """What the thermometer beside the arm shows [degC]."""
+        return sensors.thermometer(self.conditions.air.recorded(self.time), self._chance)
+
+    @property
+    def supply_voltage(self) -> float:
+        """What the board measures of its own supply [V]."""
+        return sensors.supply_meter(self._chance)
+
+    def _room(self) -> float:
+        air = self.conditions.air
+        return air.recorded(self.time) + air.unrecorded(self.time) + self._fluctuation
+
+    def _step(self, dt: float, voltage: float, moving: bool) -> None:
+        conditions = self.conditions
+        if dt <= 0.0:
+            return
+        self.time += dt
+        air = conditions.air
+        kept = math.exp(-dt / air.turbulence_time)
+        self._fluctuation = kept * self._fluctuation + (
+            air.turbulence * math.sqrt(1.0 - kept * kept) * self._chance.standard_normal())
+        self._heat(dt, voltage)
+        extra = sum(one.excess(self.time, self.tensions[0]) for one in conditions.disturbances)
+        self.muscle.age(voltage, dt, extra)
+        if moving:
+            self._swing(dt)
+        else:
+            self._find_balance(dt)
+        self._sense()
+
+    def _heat(self, dt: float, voltage: float) -> None:
+        conditions, heat = self.conditions, self.conditions.heat
+        room, airflow, contact = self._room(), 1.0, 1.0
+        for one in conditions.disturbances:
+            room += one.warmth(self.time, self.angle)
+            airflow *= one.airflow(self.time)
+            contact *= one.contact(self.time, self.angle)
+        martensite = self.muscle.martensite
+        square = conditions.heating_square(voltage, martensite, contact)
+        share = None
+        if heat.latent > 0.0:
+            tensions = list(self.tensions)
+
+            def share(temperature):
+                return self.muscle.share(temperature, tensions)
+        self.temperature = heat.advance(
+            self.temperature, heat.balance(square, room, airflow), dt, airflow, share, martensite)
+
+    def _needed(self, theta: float) -> float:
+        """Return the moment that the wires have to hold at rest [N m]."""
+        conditions = self.conditions
+        moment = conditions.linkage.moment(theta)
+        for one in conditions.disturbances:
+            moment += one.moment(self.time, theta)
+        beyond = conditions.stop_side * (theta - conditions.stop)
+        if beyond > 0.0:
+            moment -= conditions.stop_side * conditions.stop_stiffness * beyond
+        return moment
+
+    def _pull(self, theta: float) -> float:
+        """Return the wires' moment at an angle [N m], and keep their tensions."""
+        linkage, wires = self.conditions.linkage, self.muscle.wires
+        elongation = linkage.elongation(theta)
+        self.tensions = [wire.tension(self.temperature, elongation, guess)
+                         for wire, guess in zip(wires, self.tensions)]
+        return linkage.moment_arm(theta) * sum(self.tensions) * self.muscle.count / len(wires)
+
+    def _find_balance(self, dt: float) -> None:
+        conditions, old = self.conditions, self.angle
+        resistance = 0.0
+        if conditions.coulomb > 0.0:
+            surplus = self._pull(old) - self._needed(old)
+            if abs(surplus) <= conditions.coulomb:
+                self.muscle.commit(self.temperature, self.tensions)
+                return
+            resistance = math.copysign(conditions.coulomb, surplus)
+        damping = conditions.viscous / dt
+
+        def needed(theta):
+            return self._needed(theta) + resistance - damping * (theta - old)
+        self._rest_where(needed, old)
+
+    def _rest_where(self, needed, guess: float) -> None:
+        """Bring the arm to the angle at which the wires hold the moment `needed`."""
+        linkage, wires = self.conditions.linkage, self.muscle.wires
+        highest = HIGHEST_ANGLE
+        if self.conditions.stop_side > 0:
+            # Beyond this the stop alone would carry more than all the weight.
+            highest = min(highest, self.conditions.stop
+                          + linkage.moment(self.conditions.stop) / self.conditions.stop_stiffness)
+        if len(wires) == 1:
+            wire, temperature, count = wires[0], self.temperature, self.muscle.count
+
+            def tension(theta):
+                return max(needed(theta) / (count * linkage.moment_arm(theta)), 0.0)
+
+            self.angle = increasing_root(
+                lambda theta: linkage.elongation(theta) - wire.elongation(
+                    temperature, tension(theta)),
+                guess, 0.025, LOWEST_ANGLE, highest, LENGTH_TOLERANCE)
+            self.tensions = [tension(self.angle)]
+        else:
+            self.angle = increasing_root(
+                lambda theta: self._pull(theta) - needed(theta),
+                guess, TYPICAL_STIFFNESS, LOWEST_ANGLE, highest, MOMENT_TOLERANCE)
+            self._pull(self.angle)
+        self.muscle.commit(self.temperature, self.tensions)
+
+    def _settle_down(self) -> None:
+        """Let the arm sink from above to where it rests, against friction if there is any."""
+        self._rest_where(lambda theta: self._needed(theta) - self.conditions.coulomb, self.angle)
+
+    def _swing(self, dt: float) -> None:
+        """Move the arm with its inertia, by one semi-implicit step."""
+        conditions = self.conditions
+        damping = conditions.viscous or 2.0 * INNER_DAMPING * math.sqrt(
+            TYPICAL_STIFFNESS * conditions.inertia)
+        # The wires pull towards smaller angles.
+        moment = self._needed(self.angle) - self._pull(self.angle)
+        self.muscle.commit(self.temperature, self.tensions)
+        momentum = conditions.inertia * self._velocity + dt * moment
+        held = min(abs(momentum), dt * conditions.coulomb)
+        momentum -= math.copysign(held, momentum)
+        self._velocity = momentum / (conditions.inertia + dt * damping)
+        self.angle += dt * self._velocity
+        if not LOWEST_ANGLE < self.angle < HIGHEST_ANGLE:
+            self.angle = min(max(self.angle, LOWEST_ANGLE), HIGHEST_ANGLE)
+            self._velocity = 0.0
+
+    def _sense(self) -> None:
+        half = 0.5 * self.conditions.backlash
+        self._played = min(max(self._played, self.angle - half), self.angle + half)
+        self._history.append((self.time, self._seen()))
+        if self.conditions.latency <= 0.0:
+            while len(self._history) > 1:
+                self._history.popleft()
+
+    def _seen(self) -> float:
+        return self._played + self.conditions.encoder_offset + sum(
+            one.reading(self.time, self.angle) for one in self.conditions.disturbances)
+
+
+def _parts(duration: float, longest: float) -> list:
+    count = 1 if duration <= longest else math.ceil(duration / longest - 1e-9)
+    return [duration / count] * count

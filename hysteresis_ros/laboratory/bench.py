@@ -1,0 +1,111 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The bench of Fig. 6: one wire in its fan, held at its resting length or under a dead weight.
+
+Voltages are held for 30 s, so that Eq. 1 has come to rest within a quarter of a percent.
+"""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.laboratory import sensors
+from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.heat import ROOM
+from hysteresis_ros.laboratory.muscle import Muscle
+from hysteresis_ros.laboratory.solve import increasing_root
+from hysteresis_ros.laboratory.wire import LARGEST_TENSION, LENGTH_TOLERANCE
+
+# Stiffness of load cell, capstan and servo motor [N/m].
+BENCH_STIFFNESS = 5e3
+HOLD = 30.0
+# Steps in time [s] where something changes during a hold.
+CREEPING_STEP = 1.0
+TYPICAL_COMPLIANCE = 4e-4
+
+
+class Bench:
+    """
+    One wire on the bench; a new trial begins with a full heat and cool cycle.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        Of which the wire's own, its air and its heat balance count.
+    seed : int or sequence of int
+        Of the sensors' noise and the air's fluctuations.
+    """
+
+    def __init__(self, conditions: Conditions, seed=0):
+        self.conditions = conditions
+        self._muscle = Muscle(conditions)
+        self._chance = np.random.default_rng(seed)
+
+    def force_trial(self, voltages, hold: float = HOLD) -> np.ndarray:
+        """
+        Measure the force of the wire held at its resting length (Fig. 3a).
+
+        Parameters
+        ----------
+        voltages : array_like, shape (n,)
+            Each held for `hold` [V].
+        hold : float
+            Time [s].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Readings of the load cell at the end of each step [N].
+        """
+        wire, pretension = self._muscle.wires[0], self.conditions.material.pretension
+
+        def clamped(temperature, before):
+            # The wire is clamped at the resting length under its pretension; the bench gives.
+            return increasing_root(
+                lambda force: wire.elongation(temperature, force)
+                + (force - pretension) / BENCH_STIFFNESS,
+                before, TYPICAL_COMPLIANCE, 0.0, LARGEST_TENSION, LENGTH_TOLERANCE)
+        return np.array([sensors.load_cell(force, self._chance)
+                         for force in self._hold(voltages, hold, clamped, pretension)])
+
+    def length_trial(self, voltages, load: float, hold: float = HOLD) -> np.ndarray:
+        """
+        Measure the elongation of the wire under a dead weight (Fig. 3b).
+
+        Parameters
+        ----------
+        voltages : array_like, shape (n,)
+            Each held for `hold` [V].
+        load : float
+            Weight of what hangs on the wire [N].
+        hold : float
+            Time [s].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Readings of the position sensor at the end of each step [m].
+        """
+        wire, lengths = self._muscle.wires[0], []
+        for _ in self._hold(voltages, hold, lambda temperature, before: load, load):
+            lengths.append(wire.elongation(self._temperature, load))
+        return np.array([sensors.position_sensor(length, self._chance) for length in lengths])
+
+    def _hold(self, voltages, hold, equilibrium, tension):
+        """Heat and cool, then hold each voltage and yield the tension at its end."""
+        conditions, heat, muscle = self.conditions, self.conditions.heat, self._muscle
+        muscle.heat_and_cool(ROOM)
+        temperature = ROOM
+        muscle.commit(temperature, [tension])
+        count = math.ceil(hold / CREEPING_STEP) if conditions.creep > 0.0 else 1
+        for voltage in np.asarray(voltages, dtype=float).tolist():
+            balance = heat.balance(voltage * voltage, ROOM)
+            fluctuation = conditions.air.turbulence * self._chance.standard_normal()
+            for _ in range(count):
+                temperature = heat.advance(temperature, balance + fluctuation, hold / count)
+                muscle.age(voltage, hold / count)
+                tension = equilibrium(temperature, tension)
+                muscle.commit(temperature, [tension])
+            self._temperature = temperature
+            yield tension

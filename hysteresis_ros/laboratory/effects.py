@@ -1,0 +1,305 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The physical effects that the laboratory can switch on, each as a change of the arm's conditions.
+
+A strength of 1 is strong: a user would notice it at once. A strength of 0.4 is weak. The exact size
+is drawn within 15 % for each specimen. Where `signed`, a negative strength turns the effect round
+(a lighter payload, a cooler room, a stop at the other end, ...).
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
+from hysteresis_ros.laboratory.unlisted import UNLISTED
+
+# Specimens differ in an effect's size by up to this share.
+SPREAD = 0.15
+# Angles between which the clean arm moves [deg].
+LOWERED, RAISED = 141.6, 94.2
+# Enthalpy of the transformation [J/kg].
+ENTHALPY = 24e3
+
+
+@dataclasses.dataclass(frozen=True)
+class Effect:
+    """
+    One effect of the laboratory.
+
+    Parameters
+    ----------
+    sentence : str
+        What it is.
+    apply : callable
+        ``apply(conditions, size, specimen, recording)`` changes the conditions: `size` is the
+        strength, the others are sources of chance for what belongs to the arm, and for what
+        differs from one recording to the next.
+    signed : bool
+        Whether a negative strength makes sense.
+    bench : bool
+        Whether it belongs to the wire itself and so acts on the bench, too.
+    listed : bool
+        Whether the catalogue of effects has it.
+    """
+
+    sentence: str
+    apply: Callable
+    signed: bool = False
+    bench: bool = False
+    listed: bool = True
+
+
+def _supply_sag(conditions, size, specimen, recording):
+    conditions.lead_resistance = 0.9 * size
+
+
+def _pwm_dead_zone(conditions, size, specimen, recording):
+    conditions.dead_voltage = 1.0 * size
+
+
+def _resistance_change(conditions, size, specimen, recording):
+    conditions.resistance_growth = 0.17 * size
+
+
+def _thermal_lag(conditions, size, specimen, recording):
+    conditions.heat.time_constant = max(conditions.heat.time_constant, 6.0 * size)
+
+
+def _heating_cooling_asymmetry(conditions, size, specimen, recording):
+    conditions.heat.time_constant = max(conditions.heat.time_constant, 3.0)
+    conditions.heat.heating_ratio = 2.0 ** (0.87 * size)
+
+
+def _latent_heat(conditions, size, specimen, recording):
+    conditions.heat.time_constant = max(conditions.heat.time_constant, 2.0)
+    conditions.heat.latent = ENTHALPY / SPECIFIC_HEAT * size
+
+
+def _ambient_temperature(conditions, size, specimen, recording):
+    conditions.air.swing = 12.0 * size
+    conditions.air.period = 0.45 * conditions.recording_time
+    conditions.air.phase = recording.uniform(0.0, 2.0 * math.pi)
+
+
+def _ambient_drift(conditions, size, specimen, recording):
+    conditions.air.warming = 15.0 * size
+    conditions.air.warming_time = 0.6 * conditions.recording_time
+
+
+def _airflow(conditions, size, specimen, recording):
+    factor = 1.0 + 0.35 * abs(size)
+    conditions.heat.airflow *= factor if size > 0.0 else 1.0 / factor
+
+
+def _change_material(conditions, **values):
+    conditions.material = dataclasses.replace(conditions.material, **values)
+
+
+def _stress_dependence(conditions, size, specimen, recording):
+    factor = 1.0 + 0.35 * abs(size)
+    _change_material(conditions, clausius_clapeyron=conditions.material.clausius_clapeyron
+                     * (1.0 / factor if size > 0.0 else factor))
+
+
+def _stress_dependent_strain(conditions, size, specimen, recording):
+    material = conditions.material
+    growth = material.largest_strain - material.strain_without_load
+    _change_material(
+        conditions, largest_strain=material.strain_without_load + growth * (1.0 + 0.5 * size))
+
+
+def _r_phase(conditions, size, specimen, recording):
+    _change_material(conditions, early_strain=0.0085 * size)
+
+
+def _creep(conditions, size, specimen, recording):
+    conditions.creep = 0.004 * size
+
+
+def _fatigue(conditions, size, specimen, recording):
+    conditions.shrinkage = 0.0025 * size
+    conditions.tiring = 0.02 * size
+
+
+def _slack(conditions, size, specimen, recording):
+    conditions.dead_length = 0.0035 * size
+
+
+def _series_compliance(conditions, size, specimen, recording):
+    conditions.compliance = size / 2500.0
+
+
+def _unequal_muscles(conditions, size, specimen, recording):
+    conditions.wire_offsets = (-0.004 * size, 0.0, 0.004 * size)
+
+
+def _coulomb_friction(conditions, size, specimen, recording):
+    conditions.coulomb = 0.08 * size
+
+
+def _viscous_friction(conditions, size, specimen, recording):
+    conditions.viscous = 2.5 * size
+
+
+def _inertia(conditions, size, specimen, recording):
+    conditions.inertia = 0.03 * size
+
+
+def _change_linkage(conditions, **values):
+    conditions.linkage = dataclasses.replace(conditions.linkage, **values)
+
+
+def _payload_error(conditions, size, specimen, recording):
+    _change_linkage(conditions, payload_mass=conditions.linkage.payload_mass + 0.050 * size)
+
+
+def _clamp_mass(conditions, size, specimen, recording):
+    _change_linkage(conditions, clamp_mass=0.026 * size, clamp_radius=0.05, clamp_phase=0.3)
+
+
+def _geometry_error(conditions, size, specimen, recording):
+    linkage = conditions.linkage
+    _change_linkage(conditions, clamp_distance=linkage.clamp_distance + 0.0025 * size,
+                    anchor_height=linkage.anchor_height + 0.0015 * size)
+
+
+def _frame_tilt(conditions, size, specimen, recording):
+    _change_linkage(conditions, tilt=math.radians(18.0) * size)
+
+
+def _end_stop(conditions, size, specimen, recording):
+    cut = 0.25 * abs(size) * (LOWERED - RAISED)
+    conditions.stop_side = 1 if size > 0.0 else -1
+    conditions.stop = math.radians(LOWERED - cut if size > 0.0 else RAISED + cut)
+
+
+def _encoder_offset(conditions, size, specimen, recording):
+    conditions.encoder_offset = math.radians(9.0) * size
+
+
+def _backlash(conditions, size, specimen, recording):
+    conditions.backlash = math.radians(8.0) * size
+
+
+def _latency(conditions, size, specimen, recording):
+    conditions.latency = 2.0 * size
+
+
+LISTED = {
+    'supply_sag': Effect('Leads and board in series with the wire take a part of the voltage.',
+                         _supply_sag),
+    'pwm_dead_zone': Effect('The board gives nothing below a smallest voltage.', _pwm_dead_zone),
+    'resistance_change': Effect('Martensite has more resistance than austenite, so the same '
+                                'voltage heats it less.', _resistance_change, signed=True),
+    'thermal_lag': Effect('The wire takes seconds to warm up and to cool down.', _thermal_lag),
+    'heating_cooling_asymmetry': Effect('The wire warms up faster than it cools down (time '
+                                        'constant 3 s while cooling).',
+                                        _heating_cooling_asymmetry, signed=True),
+    'latent_heat': Effect('The transformation takes up heat and gives it off again (time constant '
+                          '2 s outside it).', _latent_heat),
+    'ambient_temperature': Effect('The room gets warmer and colder; a thermometer records it.',
+                                  _ambient_temperature, signed=True),
+    'ambient_drift': Effect('The air at the wires warms up over the recording; nobody records it.',
+                            _ambient_drift, signed=True),
+    'airflow': Effect('The fan blows harder than it did at the bench.', _airflow, signed=True),
+    'stress_dependence': Effect('Stress shifts the transformation further (smaller C).',
+                                _stress_dependence, signed=True, bench=True),
+    'stress_dependent_strain': Effect('The transformation strain grows further with the stress.',
+                                      _stress_dependent_strain, signed=True, bench=True),
+    'r_phase': Effect('A second, early transformation with little hysteresis.', _r_phase,
+                      bench=True),
+    'creep': Effect('The wire goes on in the direction of its last step, with the logarithm of '
+                    'time.', _creep, bench=True),
+    'fatigue': Effect('With every cycle the wire gets shorter and more of it stays martensite.',
+                      _fatigue, bench=True),
+    'slack': Effect('A part of each wire hangs loose.', _slack, bench=True),
+    'series_compliance': Effect('Crimps and cable stretch in series with the wire.',
+                                _series_compliance, bench=True),
+    'unequal_muscles': Effect('The three wires differ in length.', _unequal_muscles),
+    'coulomb_friction': Effect('The shaft rubs and sticks.', _coulomb_friction),
+    'viscous_friction': Effect('Something thick slows the shaft down.', _viscous_friction),
+    'inertia': Effect('The arm is heavy enough to swing through.', _inertia),
+    'payload_error': Effect('The weight is heavier than assumed.', _payload_error, signed=True),
+    'clamp_mass': Effect('The clamp has a mass.', _clamp_mass),
+    'geometry_error': Effect('The clamp sits further out, and the anchor higher, than assumed.',
+                             _geometry_error, signed=True),
+    'frame_tilt': Effect('The frame leans.', _frame_tilt, signed=True),
+    'end_stop': Effect('The arm meets a stop before its range ends.', _end_stop, signed=True),
+    'encoder_offset': Effect('The encoder was set to zero at a wrong angle.', _encoder_offset,
+                             signed=True),
+    'backlash': Effect('There is play between shaft and encoder.', _backlash),
+    'latency': Effect('Angles arrive late.', _latency),
+}
+
+
+def _disturb(kind):
+    def apply(conditions, size, specimen, recording):
+        conditions.disturbances.append(kind(size, conditions, specimen, recording))
+    return apply
+
+
+EFFECTS = {**LISTED, **{name: Effect(kind.__doc__, _disturb(kind), listed=False)
+                        for name, kind in UNLISTED.items()}}
+
+
+def hidden_effects() -> tuple[str, ...]:
+    """Return the names of the effects that the catalogue has, too."""
+    return tuple(LISTED)
+
+
+def unlisted_effects() -> tuple[str, ...]:
+    """Return the names of the effects that no catalogue has."""
+    return tuple(UNLISTED)
+
+
+def apply_effects(conditions: Conditions, effects: Mapping[str, float], seed: int,
+                  recording: int = 0, bench: bool = False) -> Conditions:
+    """
+    Switch effects on.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        Changed in place.
+    effects : mapping of str to float
+        Strength of each effect.
+    seed : int
+        Of the specimen, for the exact sizes.
+    recording : int
+        Which recording of it, for what happens at random moments.
+    bench : bool
+        Whether to take only those that act on the bench.
+
+    Returns
+    -------
+    Conditions
+        The same object.
+
+    Raises
+    ------
+    ParameterError
+        For an effect that does not exist or a strength that makes no sense.
+    """
+    names = list(EFFECTS)
+    for name, strength in effects.items():
+        if name not in EFFECTS:
+            raise ParameterError(f'laboratory: there is no effect {name!r}; '
+                                 f'there are {", ".join(names)}')
+        effect = EFFECTS[name]
+        least = -2.0 if effect.signed else 0.0
+        if not (math.isfinite(strength) and least <= strength <= 2.0):
+            raise ParameterError(f'laboratory: the strength of {name} has to be from {least:g} '
+                                 f'to 2, not {strength!r}')
+        if strength == 0.0 or bench and not effect.bench:
+            continue
+        specimen = np.random.default_rng([seed, names.index(name)])
+        size = strength * (1.0 + SPREAD * specimen.uniform(-1.0, 1.0))
+        effect.apply(conditions, size, specimen,
+                     np.random.default_rng([seed, names.index(name), 1 + recording]))
+    return conditions

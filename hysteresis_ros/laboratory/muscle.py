@@ -1,0 +1,119 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The wires of the arm: side by side on one clamp, with what time and use do to them."""
+
+import math
+
+from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.heat import ROOM
+from hysteresis_ros.laboratory.wire import Wire
+
+# A setpoint that changes by less than this [V] from one step to the next is held.
+HELD = 6e-3
+# Creep that a new step leaves behind fades as the grains that crept are overtaken [s].
+FADING = 1.0
+
+
+class Muscle:
+    """
+    Parallel wires; those that are alike are computed once.
+
+    Parameters
+    ----------
+    conditions : Conditions
+        Of the arm.
+
+    Attributes
+    ----------
+    wires : list of Wire
+        One, standing for all, or each of them.
+    cycles : float
+        Full transformations there and back since the muscle was new.
+    """
+
+    def __init__(self, conditions: Conditions):
+        self._conditions = conditions
+        self.wires = [Wire(conditions.material) for _ in conditions.wire_offsets]
+        self.count = conditions.linkage.muscle_count
+        self.cycles = 0.0
+        for wire in self.wires:
+            wire.compliance = conditions.compliance
+        self.heat_and_cool()
+
+    def heat_and_cool(self, temperature: float = ROOM) -> None:
+        """Wipe the memory by a full heat and cool cycle; what use has done stays."""
+        for wire in self.wires:
+            wire.heat_and_cool(temperature)
+        self._share = self.martensite
+        self._run_share = self._share
+        self._voltage = 0.0
+        self._direction = 0.0
+        self._since = 0.0
+        self._creep = self._left_creep = 0.0
+        self._extra = 0.0
+        self._set_excess()
+
+    @property
+    def martensite(self) -> float:
+        """Mean share of martensite."""
+        return sum(wire.martensite for wire in self.wires) / len(self.wires)
+
+    def share(self, temperature: float, tensions: list) -> float:
+        """Return the mean share of martensite at a temperature [degC] and tensions [N]."""
+        return sum(wire.peek_martensite(temperature, tension)
+                   for wire, tension in zip(self.wires, tensions)) / len(self.wires)
+
+    def commit(self, temperature: float, tensions: list) -> None:
+        """Bring the wires to a temperature [degC] and tensions [N], and count the travel."""
+        for wire, tension in zip(self.wires, tensions):
+            wire.commit(temperature, tension)
+        share = self.martensite
+        self.cycles += 0.5 * abs(share - self._share)
+        self._share = share
+
+    def age(self, voltage: float, dt: float, extra: float = 0.0) -> None:
+        """
+        Let time and use act on the wires' length.
+
+        Parameters
+        ----------
+        voltage : float
+            Setpoint [V]: creep counts from when it last moved.
+        dt : float
+            Time that passes [s].
+        extra : float
+            Length that something else has added to each wire [m].
+        """
+        conditions = self._conditions
+        if conditions.creep > 0.0:
+            self._creep_on(voltage, dt)
+        if conditions.tiring > 0.0:
+            for wire in self.wires:
+                wire.retained = min(conditions.tiring * math.log1p(self.cycles), 0.8)
+        self._extra = extra
+        self._set_excess()
+
+    def _creep_on(self, voltage: float, dt: float) -> None:
+        change = voltage - self._voltage
+        self._left_creep *= math.exp(-dt / FADING)
+        if abs(change) > HELD:
+            direction = math.copysign(1.0, change)
+            if self._since > 0.0 or direction != self._direction:
+                # A ramp is one run; a hold or a reversal ends it.
+                self._left_creep += self._creep
+                self._run_share = self._share
+            self._direction = direction
+            self._since = 0.0
+        else:
+            self._since += dt
+        self._voltage = voltage
+        self._creep = self._conditions.creep * self._conditions.material.resting_length * (
+            self._share - self._run_share) * math.log1p(self._since / self._conditions.creep_time)
+
+    def _set_excess(self) -> None:
+        conditions = self._conditions
+        common = conditions.dead_length + self._creep + self._left_creep + self._extra
+        common -= (conditions.shrinkage * conditions.material.resting_length
+                   * math.log1p(self.cycles))
+        for wire, offset in zip(self.wires, conditions.wire_offsets):
+            wire.excess = common + offset

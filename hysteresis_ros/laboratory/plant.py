@@ -1,0 +1,181 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One specimen of everything: its wire on the bench, and its arm.
+
+About time. Eq. 1 always holds, but how fast the wire follows is a property of the plant,
+`heat_time_constant`: 5 s by default, as in the paper, on the bench, for settled steps and for the
+simulated board. Continuous recordings of the protocol `arm-dynamic` are made with a thin wire in a
+strong fan, `BRISK` = 0.15 s, so that an arm without any hidden effect is quasi-static at 10 Hz;
+`thermal_lag`, `heating_cooling_asymmetry` and `latent_heat` bring their own seconds along.
+
+About use. An arm's trials belong to one recording: its clock goes on, and what use does to the
+wires stays, while every trial starts from the cold state after a full heat and cool cycle. Another
+recording is made on an arm of the same build with fresh wires.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory import sensors
+from hysteresis_ros.laboratory.arm import Arm
+from hysteresis_ros.laboratory.bench import Bench, HOLD
+from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.effects import apply_effects
+from hysteresis_ros.laboratory.heat import HeatBalance
+from hysteresis_ros.laboratory.linkage import GEOMETRY
+from hysteresis_ros.laboratory.wire import WireMaterial
+
+# Time constants of Eq. 1 [s]: in the paper, and in continuous recordings.
+PAPER, BRISK = 5.0, 0.15
+
+
+def specimen(seed: int) -> WireMaterial:
+    """
+    Return the material of one batch of wire, which differs a little from the next.
+
+    Parameters
+    ----------
+    seed : int
+        Which batch.
+    """
+    chance = np.random.default_rng([seed, 101])
+
+    def vary(value, share):
+        return value * (1.0 + share * chance.uniform(-1.0, 1.0))
+    usual = WireMaterial()
+    grains = dataclasses.replace(
+        usual.grains, start=usual.grains.start + chance.uniform(0.0, 1.5),
+        spread=vary(usual.grains.spread, 0.06), shape=vary(usual.grains.shape, 0.05),
+        tail=vary(usual.grains.tail, 0.08), loop=vary(usual.grains.loop, 0.05),
+        loop_growth=vary(usual.grains.loop_growth, 0.08))
+    return dataclasses.replace(
+        usual, grains=grains, grain_offset=chance.uniform(),
+        austenite_modulus=vary(usual.austenite_modulus, 0.04),
+        martensite_modulus=vary(usual.martensite_modulus, 0.04),
+        strain_without_load=vary(usual.strain_without_load, 0.03),
+        largest_strain=vary(usual.largest_strain, 0.02),
+        orienting_stress=vary(usual.orienting_stress, 0.08),
+        clausius_clapeyron=vary(usual.clausius_clapeyron, 0.03))
+
+
+class Plant:
+    """
+    A bench and an arm with wires of one batch.
+
+    Parameters
+    ----------
+    seed : int
+        Of the specimen and of all noise.
+    effects : mapping of str to float
+        Strengths of the effects that are switched on: 1 strong, 0.4 weak. Those of the wire itself
+        act on the bench, too; all others on the arm only.
+    heat_time_constant : float
+        1 / d1 of Eq. 1 on the arm [s]; the bench always has the paper's.
+    recording : int
+        Which recording of the same specimen: another one has other noise.
+    recording_time : float
+        About how long a recording on the arm takes [s], for slow and rare effects.
+
+    Raises
+    ------
+    ParameterError
+        For an effect that does not exist or a number that makes no sense.
+    """
+
+    def __init__(self, seed: int = 0, effects: Mapping[str, float] | None = None,
+                 heat_time_constant: float = PAPER, recording: int = 0,
+                 recording_time: float = 900.0):
+        if seed < 0 or recording < 0:
+            raise ParameterError(f'laboratory: seeds must not be negative, not {seed}, {recording}')
+        if not (heat_time_constant > 0.0 and recording_time > 0.0):
+            raise ParameterError('laboratory: times must be positive, not '
+                                 f'{heat_time_constant!r}, {recording_time!r}')
+        self.seed = seed
+        self.effects = dict(effects or {})
+        self.material = specimen(seed)
+        bench = apply_effects(Conditions(material=self.material), self.effects, seed, bench=True)
+        conditions = Conditions(material=self.material, recording_time=recording_time,
+                                heat=HeatBalance(time_constant=heat_time_constant))
+        apply_effects(conditions, self.effects, seed, recording)
+        self.bench = Bench(bench, seed=[seed, recording, 11])
+        self.arm = Arm(conditions, seed=[seed, recording, 12])
+        self._chance = np.random.default_rng([seed, recording, 13])
+
+    @property
+    def geometry(self) -> dict:
+        """What the arm's data sheet says: the keys of a geometry file."""
+        return dict(GEOMETRY)
+
+    def force_trial(self, voltages) -> np.ndarray:
+        """Return the settled forces [N] of the wire at its resting length, from the cold state."""
+        return self.bench.force_trial(voltages)
+
+    def length_trial(self, voltages, load: float) -> np.ndarray:
+        """Return the settled elongations [m] under a load [N], from the cold state."""
+        return self.bench.length_trial(voltages, load)
+
+    def arm_trial(self, voltages, hold: float = HOLD) -> dict[str, np.ndarray]:
+        """
+        Hold each voltage and measure the arm at the end of it, from the cold state.
+
+        Parameters
+        ----------
+        voltages : array_like, shape (n,)
+            Setpoints [V].
+        hold : float
+            How long each is held [s].
+
+        Returns
+        -------
+        dict of str to ndarray, each shape (n,)
+            Columns time, voltage, angle, ambient_temperature, supply_voltage.
+        """
+        voltages = np.asarray(voltages, dtype=float)
+        self.arm.heat_and_cool()
+        rows = []
+        for voltage in voltages.tolist():
+            self.arm.settle(hold, voltage)
+            rows.append(self._read())
+        return self._columns(hold * np.arange(1, len(voltages) + 1), voltages, rows)
+
+    def arm_run(self, time, voltage) -> dict[str, np.ndarray]:
+        """
+        Record the arm continuously, from the cold state.
+
+        Parameters
+        ----------
+        time : array_like, shape (n,)
+            Ascending sampling times from the start of the trial [s].
+        voltage : array_like, shape (n,)
+            Setpoint that was applied up to each time, since the one before [V].
+
+        Returns
+        -------
+        dict of str to ndarray, each shape (n,)
+            Columns time, voltage, angle, ambient_temperature, supply_voltage.
+        """
+        time, voltage = np.asarray(time, dtype=float), np.asarray(voltage, dtype=float)
+        if time.shape != voltage.shape or time.ndim != 1 or np.any(np.diff(time, prepend=0.0) < 0):
+            raise ParameterError('laboratory: an arm run needs as many voltages as ascending times')
+        self.arm.heat_and_cool()
+        rows = []
+        for dt, value in zip(np.diff(time, prepend=0.0).tolist(), voltage.tolist()):
+            self.arm.advance(dt, value)
+            rows.append(self._read())
+        return self._columns(time, voltage, rows)
+
+    def _read(self) -> tuple[float, float, float]:
+        arm = self.arm
+        return (sensors.counted_angle(arm.encoder_counts),
+                sensors.thermometer(arm.conditions.air.recorded(arm.time), self._chance),
+                sensors.supply_meter(self._chance))
+
+    @staticmethod
+    def _columns(time, voltage, rows) -> dict[str, np.ndarray]:
+        angle, ambient, supply = np.array(rows).reshape(-1, 3).T
+        return {'time': time, 'voltage': voltage, 'angle': angle,
+                'ambient_temperature': ambient, 'supply_voltage': supply}
