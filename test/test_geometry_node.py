@@ -85,7 +85,7 @@ def test_target_that_makes_no_sense_is_not_passed_on(graph, target, words):
 
 def test_angle_beyond_the_linkage_is_refused(graph):
     """Also where the limits would allow it."""
-    bicep = Bicep(graph, minimum_angle=0.0, maximum_angle=3.2)
+    bicep = Bicep(graph, minimum_angle=0.0, maximum_angle=3.14)
     bicep.aim(0.1)
     graph.until(bicep.warned, 'a warning')
     assert "linkage's range" in bicep.statuses[-1].message
@@ -94,12 +94,12 @@ def test_angle_beyond_the_linkage_is_refused(graph):
 
 def test_limits_that_are_the_wrong_way_round_are_refused(graph):
     """A cross check of two parameters, also at run time."""
-    bicep = Bicep(graph)
-    parameter = Parameter('minimum_angle', value=3.15).to_parameter_msg()
+    bicep = Bicep(graph, maximum_angle=2.5)
+    parameter = Parameter('minimum_angle', value=3.0).to_parameter_msg()
     result = graph.call(SetParameters, 'bicep_geometry/set_parameters',
                         SetParameters.Request(parameters=[parameter])).results[0]
     assert not result.successful
-    assert 'minimum_angle 3.15 has to be below' in result.reason
+    assert 'minimum_angle 3 has to be below' in result.reason
     bicep.aim(1.5)
     bicep.wait(1)
 

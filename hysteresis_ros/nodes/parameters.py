@@ -106,8 +106,10 @@ MODEL = (
 )
 
 ANGLE_LIMITS = (
-    Spec('minimum_angle', 0.9, 'Smallest target angle that is passed on', 'rad', 0.0, 3.2),
-    Spec('maximum_angle', 3.1, 'Largest target angle that is passed on', 'rad', 0.0, 3.2),
+    Spec('minimum_angle', 0.0, 'Smallest target angle that is passed on; the linkage has its own',
+         'rad', 0.0, 3.1416),
+    Spec('maximum_angle', 3.1416, 'Largest target angle that is passed on; the linkage has its own',
+         'rad', 0.0, 3.1416),
 )
 
 VOLTAGE_LIMITS = (
