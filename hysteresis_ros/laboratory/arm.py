@@ -8,6 +8,7 @@ arm follows at once unless it has inertia; with friction it sticks until the wir
 """
 
 import collections
+import functools
 import math
 
 import numpy as np
@@ -158,14 +159,9 @@ class Arm:
             contact *= one.contact(self.time, self.angle)
         martensite = self.muscle.martensite
         square = conditions.heating_square(voltage, martensite, contact)
-        share = None
-        if heat.latent > 0.0:
-            tensions = list(self.tensions)
-
-            def share(temperature):
-                return self.muscle.share(temperature, tensions)
         self.temperature = heat.advance(
-            self.temperature, heat.balance(square, room, airflow), dt, airflow, share, martensite)
+            self.temperature, heat.balance(square, room, airflow), dt, airflow,
+            functools.partial(self.muscle.share, self.tensions), martensite)
 
     def _needed(self, theta: float) -> float:
         """Return the moment that the wires have to hold at rest [N m]."""

@@ -58,8 +58,8 @@ class Muscle:
         """Mean share of martensite."""
         return sum(wire.martensite for wire in self.wires) / len(self.wires)
 
-    def share(self, temperature: float, tensions: list) -> float:
-        """Return the mean share of martensite at a temperature [degC] and tensions [N]."""
+    def share(self, tensions: list, temperature: float) -> float:
+        """Return the mean share of martensite at tensions [N] and a temperature [degC]."""
         return sum(wire.peek_martensite(temperature, tension)
                    for wire, tension in zip(self.wires, tensions)) / len(self.wires)
 

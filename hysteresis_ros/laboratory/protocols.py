@@ -1,0 +1,168 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whole experiments, written as the tables that a user would have. None says what is hidden in it.
+
+============== =====================================================================================
+bench          force.csv: trial 0 the damped oscillation, trial 1 random; length.csv: trials 0 to 3
+               the damped oscillation under four loads, trials 4 to 7 random; geometry.yaml
+arm-steps      train.csv, test.csv: sinusoid, random, staircase, ramps, each step held for 30 s
+arm-dynamic    train.csv, test.csv: steps, ramps, a repeated loop and long holds, sampled at 10 Hz
+============== =====================================================================================
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory import sequences
+from hysteresis_ros.laboratory.bench import HOLD
+from hysteresis_ros.laboratory.linkage import GEOMETRY
+from hysteresis_ros.laboratory.plant import BRISK, Plant
+from hysteresis_ros.measurements.csv import write_csv
+
+# Weights on the bench [N]: 20 g of magnet and hooks with 100, 300, 500 and 700 g, at 9.8 m/s^2.
+LOADS = (1.176, 3.136, 5.096, 7.056)
+FORCE_STEPS, LENGTH_STEPS = 74, 51
+ARM_STEPS = 60
+GEOMETRY_FILE = 'geometry.yaml'
+
+Table = dict[str, np.ndarray]
+
+
+def bench_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
+    """Return the tables of the bench, by file name."""
+    plant = Plant(seed, effects)
+    chance = np.random.default_rng([seed, 21])
+    oscillation = sequences.damped_oscillation()
+    force, length = [], []
+    for voltage in (oscillation, sequences.random_steps(FORCE_STEPS, chance)):
+        force.append({'step': np.arange(len(voltage)), 'voltage': voltage,
+                      'force': plant.force_trial(voltage)})
+    for random in (False, True):
+        for load in LOADS:
+            voltage = sequences.random_steps(LENGTH_STEPS, chance) if random else oscillation
+            length.append({'step': np.arange(len(voltage)), 'voltage': voltage,
+                           'force': np.full(len(voltage), load),
+                           'length': plant.length_trial(voltage, load)})
+    return {'force.csv': _stack(force, ['trial', 'step', 'voltage', 'force']),
+            'length.csv': _stack(length, ['trial', 'step', 'voltage', 'force', 'length'])}
+
+
+def arm_step_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
+    """Return the tables of settled steps of the arm, by file name."""
+    kinds = (sequences.sinusoid, sequences.random_moves, sequences.staircase,
+             sequences.up_and_down)
+
+    def record(recording):
+        chance = np.random.default_rng([seed, recording, 22])
+        plant = Plant(seed, effects, recording=recording,
+                      recording_time=HOLD * ARM_STEPS * len(kinds))
+        return [plant.arm_trial(kind(ARM_STEPS, chance)) for kind in kinds]
+    return _recordings(record)
+
+
+def arm_dynamic_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
+    """Return the tables of continuous recordings of the arm, by file name."""
+    kinds = (sequences.steps_of_all_speeds, sequences.repeated_loop, sequences.ramps,
+             sequences.long_holds)
+
+    def record(recording):
+        chance = np.random.default_rng([seed, recording, 23])
+        runs = [kind(chance) for kind in kinds]
+        plant = Plant(seed, effects, heat_time_constant=BRISK, recording=recording,
+                      recording_time=sequences.SAMPLING * sum(len(run) for run in runs))
+        return [plant.arm_run(np.round(sequences.SAMPLING * np.arange(1, len(run) + 1), 3), run)
+                for run in runs]
+    return _recordings(record)
+
+
+def _recordings(record: Callable[[int], list[Table]]) -> dict[str, Table]:
+    columns = ['time', 'trial', 'voltage', 'angle', 'ambient_temperature', 'supply_voltage']
+    return {f'{name}.csv': _stack(record(recording), columns)
+            for recording, name in enumerate(('train', 'test'))}
+
+
+def _stack(trials: list[Table], columns: list[str]) -> Table:
+    trials = [{'trial': np.full(len(table['voltage']), number), **table}
+              for number, table in enumerate(trials)]
+    return {name: np.concatenate([table[name] for table in trials]) for name in columns}
+
+
+PROTOCOLS = {'bench': bench_tables, 'arm-steps': arm_step_tables,
+             'arm-dynamic': arm_dynamic_tables}
+
+
+def protocol_tables(name: str, effects: Mapping[str, float] | None = None,
+                    seed: int = 0) -> dict[str, Table]:
+    """
+    Carry a protocol out and return its tables.
+
+    Parameters
+    ----------
+    name : str
+        A key of `PROTOCOLS`.
+    effects : mapping of str to float
+        Strengths of hidden effects. On the bench only those of the wire itself act.
+    seed : int
+        Of specimen, noise and random sequences.
+
+    Returns
+    -------
+    dict of str to dict of str to ndarray
+        Columns by file name.
+
+    Raises
+    ------
+    ParameterError
+        For a protocol or an effect that does not exist.
+    """
+    if name not in PROTOCOLS:
+        raise ParameterError(f'laboratory: there is no protocol {name!r}; '
+                             f'there are {", ".join(PROTOCOLS)}')
+    return PROTOCOLS[name](effects or {}, seed)
+
+
+def write_protocol(name: str, directory, effects: Mapping[str, float] | None = None,
+                   seed: int = 0) -> list[Path]:
+    """
+    Carry a protocol out and write its tables.
+
+    Parameters
+    ----------
+    name, effects, seed
+        As for `protocol_tables`.
+    directory : str or Path
+        Made where it is missing.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    ParameterError
+        For a protocol or an effect that does not exist.
+    OSError
+        If a file cannot be written.
+    """
+    tables = protocol_tables(name, effects, seed)
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, columns in tables.items():
+        write_csv(_printable(columns), folder / file)
+    files = [folder / file for file in tables]
+    if name == 'bench':
+        files.append(folder / GEOMETRY_FILE)
+        files[-1].write_text(yaml.safe_dump(GEOMETRY, sort_keys=False), encoding='utf-8')
+    return files
+
+
+def _printable(columns: Table) -> Table:
+    # What an instrument prints: more digits than it resolves, not all that a float has.
+    return {name: values if values.dtype.kind == 'i' else np.round(values, 7)
+            for name, values in columns.items()}
