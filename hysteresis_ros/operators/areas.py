@@ -54,6 +54,33 @@ def signed_areas(nodes: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     return areas
 
 
+def signed_lengths(nodes: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """
+    Return the signed lengths of the diagonal's intervals: the rows of the reversible weights.
+
+    Parameters
+    ----------
+    nodes : array_like, shape (N + 1,)
+        Grid nodes, strictly increasing.
+    inputs : array_like, shape (M,)
+        Inputs; without a loop their order does not matter.
+
+    Returns
+    -------
+    ndarray, shape (M, N)
+        Length of each interval below the input less its length above.
+
+    Raises
+    ------
+    ParameterError
+        If the nodes are not increasing.
+
+    """
+    nodes = check_nodes(nodes)
+    width = np.diff(nodes)
+    return 2.0 * np.clip(sequence(inputs)[:, None] - nodes[:-1], 0.0, width) - width
+
+
 def _history(inputs: list[float], lower: float) -> tuple[list[int], np.ndarray]:
     """
     Find the corner of the staircase that the branch of each input starts from.

@@ -14,6 +14,10 @@ the diagonal. The Everett function E(alpha, beta) is the weight over the triangl
 with p = alpha - x_a, q = x_(b+1) - beta, the weights w, w_a, w_b of the cell and of the two
 diagonal cells beside it, and A, C the weight along the row and along the column up to the cell.
 In a diagonal cell it is w (alpha - beta)^2 / 2. All terms are non-negative: nothing cancels.
+
+A weight can also lie on the diagonal beta = alpha itself, g per unit of its length: relays without
+a loop, the limit of ever smaller diagonal cells. It adds g (alpha - beta) in a diagonal cell, g_a to
+A and g_b to C.
 """
 
 from bisect import bisect_right
@@ -92,6 +96,8 @@ class Everett:
         Checked grid nodes.
     weights : ndarray, shape (N (N + 1) / 2,)
         Non-negative weights in the order of Eq. 8.
+    slopes : ndarray, shape (N,)
+        Non-negative weights on the diagonal itself, one an interval.
 
     Attributes
     ----------
@@ -100,7 +106,7 @@ class Everett:
 
     """
 
-    def __init__(self, nodes: np.ndarray, weights: np.ndarray) -> None:
+    def __init__(self, nodes: np.ndarray, weights: np.ndarray, slopes: np.ndarray) -> None:
         levels = len(nodes) - 1
         width = np.diff(nodes)
         beta, alpha = cells(levels)
@@ -120,14 +126,20 @@ class Everett:
         column[:, 1:] = np.cumsum(np.triu(density * width[None, :], 1), axis=1)
         half = np.diag(density) / 2.0
 
+        along = np.concatenate(([0.0], np.cumsum(slopes * width)))
+        corner += np.triu(along[None, :] - along[:, None])
+        row += slopes[None, :]
+        column += slopes[:, None]
+
         self.total = float(corner[0, levels])
         self.nodes = nodes
-        self._arrays = corner, row, column, density, half
+        self._arrays = corner, row, column, density, half, slopes
         # The scalar path reads plain floats from lists: about ten times faster than arrays.
         self._levels = levels
         self._list = nodes.tolist()
         self._inner = self._list[1:-1]
         self._half = half.tolist()
+        self._slope = slopes.tolist()
         self._corner = corner.tolist()
         self._corner_columns = corner.T.tolist()
         self._row_columns = row.T.tolist()
@@ -143,7 +155,7 @@ class Everett:
         b = bisect_right(self._inner, beta)
         if a == b:
             d = alpha - beta
-            return self._half[a] * d * d
+            return d * (self._slope[a] + self._half[a] * d)
         x_a, x_b, corner, row, column, cross, half_a, half_b = self._cells[a][b]
         p = alpha - x_a
         q = x_b - beta
@@ -151,29 +163,32 @@ class Everett:
 
     def value(self, alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:
         """Return E at points given as arrays that broadcast."""
-        corner, row, column, density, half = self._arrays
+        corner, row, column, density, half, slope = self._arrays
         a, b = self.cell(alpha), self.cell(beta)
         p = alpha - self.nodes[a]
         q = self.nodes[b + 1] - beta
         square = (corner[b + 1, a] + p * (row[b + 1, a] + density[b, a] * q + half[a] * p)
                   + q * (column[b, a] + half[b] * q))
-        return np.where(a == b, half[a] * np.square(alpha - beta), square)
+        d = alpha - beta
+        return np.where(a == b, d * (slope[a] + half[a] * d), square)
 
     def rise(self, alpha: np.ndarray, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return dE/dalpha at points, and half of the second derivative, just above alpha."""
-        _, row, _, density, half = self._arrays
+        _, row, _, density, half, diagonal = self._arrays
         a, b = self.cell(alpha), self.cell(beta)
         square = (row[b + 1, a] + density[b, a] * (self.nodes[b + 1] - beta)
                   + 2.0 * half[a] * (alpha - self.nodes[a]))
-        return np.where(a == b, 2.0 * half[a] * (alpha - beta), square), half[a]
+        within = diagonal[a] + 2.0 * half[a] * (alpha - beta)
+        return np.where(a == b, within, square), half[a]
 
     def fall(self, alpha: np.ndarray, beta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return -dE/dbeta at points, and half of the second derivative, just above beta."""
-        _, _, column, density, half = self._arrays
+        _, _, column, density, half, diagonal = self._arrays
         a, b = self.cell(alpha), self.cell(beta)
         square = (column[b, a] + density[b, a] * (alpha - self.nodes[a])
                   + 2.0 * half[b] * (self.nodes[b + 1] - beta))
-        return np.where(a == b, 2.0 * half[b] * (alpha - beta), square), half[b]
+        within = diagonal[b] + 2.0 * half[b] * (alpha - beta)
+        return np.where(a == b, within, square), half[b]
 
     def cell(self, u: np.ndarray) -> np.ndarray:
         """Return the interval that inputs lie in; a node belongs to the one above it."""
@@ -204,15 +219,17 @@ class Everett:
         b = bisect_right(self._inner, beta)
         q = self._list[b + 1] - beta
         half = self._half[b]
-        first = half * q * q
+        slope = self._slope[b]
+        first = q * (slope + half * q)
         if target - tolerance <= first:
-            p = min(math.sqrt(target / half), q)
-            return beta + p, half * p * p
+            p = _root(target, slope, half, q)
+            return beta + p, p * (slope + half * p)
         corners, columns = self._corner[b + 1], self._column[b]
         low, high = b + 1, self._levels
         if low == high:
             return self._list[high], first
-        sought = target - tolerance - first
+        bend = half * q * q
+        sought = target - tolerance - bend
         while high - low > 1:
             middle = (low + high) // 2
             if corners[middle] + columns[middle] * q < sought:
@@ -220,7 +237,7 @@ class Everett:
             else:
                 high = middle
         x, _, corner, row, column, cross, half, _ = self._cells[low][b]
-        start = first + corner + column * q
+        start = bend + corner + column * q
         slope = row + cross * q
         p = _root(target - start, slope, half, self._list[high] - x)
         return x + p, start + p * (slope + half * p)
@@ -236,15 +253,17 @@ class Everett:
         a = bisect_right(self._inner, alpha)
         p = alpha - self._list[a]
         half = self._half[a]
-        first = half * p * p
+        slope = self._slope[a]
+        first = p * (slope + half * p)
         if target - tolerance <= first:
-            q = min(math.sqrt(target / half), p)
-            return alpha - q, half * q * q
+            q = _root(target, slope, half, p)
+            return alpha - q, q * (slope + half * q)
         corners, rows = self._corner_columns[a], self._row_columns[a]
         low, high = 0, a
         if low == high:
             return self._list[low], first
-        sought = target - tolerance - first
+        bend = half * p * p
+        sought = target - tolerance - bend
         while high - low > 1:
             middle = (low + high) // 2
             if corners[middle] + rows[middle] * p < sought:
@@ -252,7 +271,7 @@ class Everett:
             else:
                 low = middle
         _, x, corner, row, column, cross, _, half = self._cells[a][low]
-        start = first + corner + row * p
+        start = bend + corner + row * p
         slope = column + cross * p
         q = _root(target - start, slope, half, x - self._list[low])
         return x - q, start + q * (slope + half * q)

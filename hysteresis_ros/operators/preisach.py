@@ -30,7 +30,10 @@ class Preisach(HysteresisOperator):
     """
     Preisach operator with a piecewise constant weight of one sign.
 
-    Output = sum over the cells of weight times signed area + bias (Eq. 6).
+    Output = sum over the cells of weight times signed area + bias (Eq. 6), and optionally + sum
+    over the intervals of reversible weight times signed length: relays without a loop, on the line
+    beta = alpha. Cells alone, however small their weight's loop should be, make loops of their own
+    width, and leave a branch with slope zero where it turns.
 
     Parameters
     ----------
@@ -42,6 +45,9 @@ class Preisach(HysteresisOperator):
         when the input rises). Unit of the output over the square of the unit of the input.
     bias : float
         The constant c of Eqs. 3 and 6.
+    reversible : array_like, shape (N,), optional
+        Weights on the line beta = alpha, one an interval, of the same sign. Half the slope that
+        every branch has there at least: unit of the output over the unit of the input.
 
     Raises
     ------
@@ -53,21 +59,30 @@ class Preisach(HysteresisOperator):
 
     kind = 'preisach'
 
-    def __init__(self, nodes: np.ndarray, weights: np.ndarray, bias: float = 0.0) -> None:
+    def __init__(self, nodes: np.ndarray, weights: np.ndarray, bias: float = 0.0,
+                 reversible: np.ndarray | None = None) -> None:
         self.nodes = check_nodes(nodes)
-        self.weights = _check_weights(weights, len(self.nodes) - 1)
+        levels = len(self.nodes) - 1
+        self.weights = _check_weights(weights, levels)
+        self.reversible = numbers(
+            np.zeros(levels) if reversible is None else reversible, 'Preisach reversible weights')
+        if len(self.reversible) != levels:
+            raise ParameterError(f'Preisach reversible weights: {len(self.reversible)} given for '
+                                 f'{levels} levels')
         self.bias = number(bias, 'Preisach bias')
         self.lower, self.upper = float(self.nodes[0]), float(self.nodes[-1])
-        self._sign = one_sign(self.weights, 'Preisach weights')
+        self._sign = one_sign(
+            np.concatenate((self.weights, self.reversible)), 'Preisach weights')
         # The output is base + sign * z with z from 0, all relays down, to span, all up.
-        self._everett = Everett(self.nodes, 2.0 * np.abs(self.weights))
+        self._everett = Everett(
+            self.nodes, 2.0 * np.abs(self.weights), 2.0 * np.abs(self.reversible))
         self._span = self._everett.total
         self._base = self.bias - self._sign * self._span / 2.0
         if not self._span + abs(self._base) <= LARGEST:
             raise ParameterError(
                 f'Preisach operator: the output reaches beyond {LARGEST:g}, use another unit')
         self._tolerance = RESOLUTION * self._span
-        for array in (self.nodes, self.weights):
+        for array in (self.nodes, self.weights, self.reversible):
             array.flags.writeable = False
         self.reset()
 
@@ -358,14 +373,15 @@ class Preisach(HysteresisOperator):
     def to_dict(self) -> dict[str, Any]:
         """Return kind and parameters as plain types, without the memory; floats are exact."""
         return {'kind': self.kind, 'nodes': self.nodes.tolist(),
-                'weights': self.weights.tolist(), 'bias': self.bias}
+                'weights': self.weights.tolist(), 'bias': self.bias,
+                'reversible': self.reversible.tolist()}
 
     @classmethod
     def from_dict(cls, parameters: Mapping[str, Any]) -> 'Preisach':
         """Build the operator from what `to_dict` returned; ParameterError if it cannot be."""
         where = 'Preisach operator'
         return cls(take(parameters, 'nodes', where), take(parameters, 'weights', where),
-                   take(parameters, 'bias', where))
+                   take(parameters, 'bias', where), take(parameters, 'reversible', where))
 
 
 def _check_weights(weights: np.ndarray, levels: int) -> np.ndarray:
