@@ -12,6 +12,7 @@ import dataclasses
 
 import numpy as np
 
+from hysteresis_ros.diagnosis.structure import Offset
 from hysteresis_ros.effects import SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.least_squares import fit_weights
@@ -119,6 +120,9 @@ class Problem:
             for name, values in parts.items():
                 columns.setdefault(name, []).append(np.concatenate(values))
         signals = {name: self.pick(values) for name, values in columns.items()}
+        # Recordings follow each other; each begins its clock anew.
+        ends = np.cumsum([0.0] + [s.trials[-1].inputs.clock[-1] for s in self.simulators])
+        self.clock = signals['clock'] + np.repeat(ends[:-1], [len(rows) for rows in self.chosen])
         return {name: values for name, values in signals.items()
                 if np.all(np.isfinite(values)) and np.ptp(values) > 0.0}
 
@@ -149,6 +153,25 @@ class ArmProblem(Problem):
     def completed(self, effects):
         """Return the model with these effects."""
         return self.model.with_effects(effects)
+
+    def weight_columns(self, effects) -> np.ndarray:
+        """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""
+        stage = self.model.length_stage
+        if not isinstance(stage, Preisach):
+            return np.zeros((len(self.measured), 0))
+        step = 0.01 * self.model.surroundings.span
+        columns = []
+        for simulator, rows in zip(self.simulators, self.chosen):
+            simulator.stride = 1 if self.settled else self.stride
+            inputs: list[np.ndarray] = []
+            base = simulator.run(effects, inputs)
+            moved = simulator.run([*effects, Offset(step)])
+            areas = np.concatenate([
+                np.apply_along_axis(lambda column: np.interp(
+                    np.arange(count), chosen, column), 0, signed_areas(stage.nodes, u))
+                for u, chosen, count in inputs])
+            columns.append((((moved - base) / step)[:, None] * areas)[rows])
+        return np.concatenate(columns)
 
 
 @dataclasses.dataclass
@@ -263,6 +286,10 @@ class BenchProblem(Problem):
                 time=self.signals['time'][rows])
             sensed[rows] = effect.forward(response[rows], inputs)
         return sensed
+
+    def weight_columns(self, effects) -> np.ndarray:
+        """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""
+        return self._design(effects).rows
 
     def completed(self, effects):
         """Return the model with these effects and H2's weights refitted to all rows."""

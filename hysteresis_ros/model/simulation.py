@@ -89,13 +89,16 @@ class Simulator:
         self.stride = 1 if measurement.settled else stride
         self.trials = trials_of(model, measurement)
 
-    def run(self, effects) -> np.ndarray:
+    def run(self, effects, inputs_of_stage: list | None = None) -> np.ndarray:
         """
         Simulate with these effects.
 
         Parameters
         ----------
         effects : sequence of Effect
+        inputs_of_stage : list, optional
+            Takes for each trial of an arm run H2's inputs, the rows they belong to, and the
+            trial's number of rows.
 
         Returns
         -------
@@ -105,7 +108,7 @@ class Simulator:
         model = self.model
         chain = Chain(effects, model.surroundings)
         result = np.empty(self.measurement.rows)
-        respond = self._responder(chain, effects)
+        respond = self._responder(chain, effects, inputs_of_stage)
         for trial in self.trials:
             inputs = trial.inputs
             if chain.needs_phase:
@@ -125,7 +128,7 @@ class Simulator:
         low, high = self.model.length_stage.output_range
         return np.clip((length - low) / max(high - low, 1e-12), 0.0, 1.0)
 
-    def _responder(self, chain, effects):
+    def _responder(self, chain, effects, inputs_of_stage):
         response = self.measurement.response
         if response == 'force':
             return lambda trial, inputs: self._force(chain, trial, inputs)
@@ -136,7 +139,8 @@ class Simulator:
                                      'bicep needs one that contracts')
             offsets = next((e.offsets for e in effects if hasattr(e, 'offsets')), (0.0,))
             balance = ArmBalance(stage, self.model.require_geometry(), chain, offsets)
-            return lambda trial, inputs: self._angle(chain, balance, trial, inputs)
+            return lambda trial, inputs: self._angle(
+                chain, balance, trial, inputs, inputs_of_stage)
         return lambda trial, inputs: self._length(chain, stage, trial, inputs)
 
     def _first(self, chain, trial, inputs):
@@ -168,7 +172,7 @@ class Simulator:
         return (base + chain.scale(trial.load) * factor * (output - base)
                 + chain.stretch(trial.load) + offset)
 
-    def _angle(self, chain, balance, trial, inputs):
+    def _angle(self, chain, balance, trial, inputs, inputs_of_stage):
         cold, x, heat, _ = self._first(chain, trial, inputs)
         offset, factor = chain.drift(trial.drive, heat, inputs)
         chosen = self._chosen_rows(x)
@@ -176,9 +180,13 @@ class Simulator:
         steps = np.diff(times, prepend=0.0).tolist()
         balance.start()
         balance.settle(float(cold))
-        advance = balance.step
-        angles = [advance(*row) for row in zip(
-            x[chosen].tolist(), steps, offset[chosen].tolist(), factor[chosen].tolist())]
+        angles, stage_inputs = [], []
+        for row in zip(x[chosen].tolist(), steps, offset[chosen].tolist(),
+                       factor[chosen].tolist()):
+            angles.append(balance.step(*row))
+            stage_inputs.append(balance.operators[0].input)
+        if inputs_of_stage is not None:
+            inputs_of_stage.append((np.array(stage_inputs), chosen, len(x)))
         if len(chosen) == len(x):
             return np.array(angles)
         return np.interp(inputs.time, times, angles)

@@ -1,0 +1,126 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which effects a recording can show at all, and how well each of them explains it."""
+
+import dataclasses
+import math
+
+import joblib
+import numpy as np
+
+from hysteresis_ros.diagnosis.fit import Fit
+from hysteresis_ros.effects import catalogue
+
+
+@dataclasses.dataclass
+class Candidate:
+    """
+    One effect, fitted beside those that are already in the model.
+
+    Attributes
+    ----------
+    id : str
+        The effect.
+    fit : Fit
+        With it; `fit.effects[-1]` is the effect.
+    signature : ndarray, shape (n,)
+        What it changes in the response.
+    rmse : float
+        Held-out error with it.
+    gain : float
+        Reduction of the mean square held-out error.
+    p_value : float
+        Family-wise; 1 until tested.
+    implausible : list of str
+        Its parameters outside their physical range.
+    """
+
+    id: str
+    fit: Fit
+    signature: np.ndarray
+    rmse: float
+    gain: float
+    p_value: float = 1.0
+    implausible: list = dataclasses.field(default_factory=list)
+
+    @property
+    def effect(self):
+        """The fitted effect."""
+        return self.fit.effects[-1]
+
+
+def possible(problem, known) -> tuple[list[str], dict[str, str]]:
+    """
+    Divide the catalogue into effects to try and effects that this data cannot show.
+
+    Returns
+    -------
+    list of str, dict of str to str
+        Identifiers to try; identifiers that are left out with the reason.
+    """
+    surroundings = problem.model.surroundings
+    taken = {effect.id for effect in [*problem.model.effects, *known]}
+    names, hopeless = [], {}
+    for name, effect in catalogue().items():
+        if name in taken or problem.kind not in effect.kinds:
+            continue
+        if not effect.available(surroundings):
+            continue
+        column = effect.needs_column
+        if effect.needs_transients and problem.settled:
+            hopeless[name] = 'every row is settled'
+        elif column and not any(
+                np.ptp(m.columns[column]) > 0.0 if column in m.columns else False
+                for m in problem.measurements):
+            hopeless[name] = f'{column} was not recorded or did not change'
+        else:
+            names.append(name)
+    return names, hopeless
+
+
+def consider(fitter, known, current: Fit, name: str, replaced: tuple = ()) -> Candidate | None:
+    """
+    Fit and cross-validate one effect.
+
+    Parameters
+    ----------
+    fitter : Fitter
+        For the problem.
+    known : list of Effect
+        Effects found before.
+    current : Fit
+        The fit with them, cross-validated.
+    name : str
+        The effect to try.
+    replaced : tuple of str
+        Known effects that the new one contains, which are left out.
+
+    Returns
+    -------
+    Candidate or None
+        None if the simulation with it is not finite.
+    """
+    problem = fitter.problem
+    kind = catalogue()[name]
+    beside = [effect for effect in known if effect.id not in kind.replaces]
+    effect = kind(problem.model.surroundings)
+    with np.errstate(all='ignore'):
+        fit = fitter.search(problem.model.effects, beside, effect)
+        fit = fitter.cross_validate(problem.model.effects, fit)
+    if not (np.all(np.isfinite(fit.held_out)) and np.all(np.isfinite(fit.jacobian))):
+        return None
+    before = fitter.error(current.held_out)
+    after = fitter.error(fit.held_out)
+    return Candidate(name, fit, fit.predicted - current.predicted, after,
+                     before ** 2 - after ** 2, implausible=fit.effects[-1].implausible())
+
+
+def consider_all(fitter, known, current: Fit, names, jobs: int, progress) -> list[Candidate]:
+    """Try every effect named, in parallel; see `consider`."""
+    parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
+    tasks = (joblib.delayed(consider)(fitter, known, current, name) for name in names)
+    found = []
+    for candidate in progress(parallel(tasks), len(names)):
+        if candidate is not None and math.isfinite(candidate.rmse):
+            found.append(candidate)
+    return sorted(found, key=lambda candidate: candidate.rmse)

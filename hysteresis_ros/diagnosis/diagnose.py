@@ -1,0 +1,419 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Find the physical effects that a model is missing, or say why none can be named.
+
+The best effect on held-out rows is added if it explains more than chance and more than the base
+model's own error could, then all others are tried again beside it, until nothing more is found.
+What is left after that is compared with what the base model and the sensor leave by themselves.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from hysteresis_ros.diagnosis import leftover, significance, structure
+from hysteresis_ros.diagnosis.candidates import Candidate, consider, consider_all, possible
+from hysteresis_ros.diagnosis.fit import Fitter
+from hysteresis_ros.diagnosis.problem import problem_for
+from hysteresis_ros.effects import catalogue
+
+SIGNIFICANCE = 0.05
+# Smallest reduction of the RMSE that matters to a user.
+PRACTICAL = 0.05
+# Share of blocks in which an effect has to help.
+CONSISTENT = 0.55
+MOST_EFFECTS = 3
+# Effects whose signatures agree more than this cannot be told apart.
+CONFUSED = 0.9
+# The base model's error on the arm may be this many times that of the bench's verification.
+STRUCTURE_MARGIN = 1.3
+# More than this share of the first mean square left over means that the cause is not known.
+UNEXPLAINED = 0.3
+MOST_ALTERNATIVES = 3
+# Rivals that are fitted again when a set of effects is checked.
+RIVALS = 6
+
+
+@dataclasses.dataclass
+class Diagnosis:
+    """
+    The verdict and what it rests on; `to_json` gives the fields by the names users rely on.
+
+    Attributes
+    ----------
+    verdict : str
+        'adequate', 'missing', 'unknown' or 'not_excited'.
+    missing : list of str
+        Effects to add, in order.
+    alternatives : list of list of str
+        For each missing effect those that the data cannot tell from it.
+    ranking : list of dict
+        Every effect that was tried, best first.
+    noise_floor, structural_error : float
+        What sensor and base model leave by themselves, in the unit of the response.
+    unexplained : float
+        Share of the mean square error that nothing explains.
+    experiment : str
+        What to measure next.
+    effects : list of Effect
+        The missing ones, fitted, with intervals.
+    rmse_before, rmse_after : float
+        Held-out error without and with them.
+    not_excited : dict of str to str
+        Effects that could not have shown, with the reason.
+    event : float or None
+        Time [s] at which something happened that lasts.
+    signal : str
+        Signal in which unexplained structure shows.
+    """
+
+    verdict: str
+    missing: list
+    alternatives: list
+    ranking: list
+    noise_floor: float
+    structural_error: float
+    unexplained: float
+    experiment: str
+    effects: list
+    rmse_before: float
+    rmse_after: float
+    not_excited: dict
+    event: float | None
+    signal: str
+
+    def to_json(self) -> dict:
+        """Return plain types for JSON."""
+        content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)
+                   if field.name != 'effects'}
+        content['effects'] = [effect.to_dict() for effect in self.effects]
+        return content
+
+
+def _silent(iterable, total):
+    return iterable
+
+
+def diagnose(model, measurements, jobs: int = 1, seed: int = 0, progress=_silent) -> Diagnosis:
+    """
+    Find what the model is missing.
+
+    Parameters
+    ----------
+    model : MuscleModel
+        With the effects it already has.
+    measurements : sequence of Measurement
+        Bench tables or arm runs.
+    jobs : int
+        Processes; -1 for all cores. Any joblib backend in force is used.
+    seed : int
+        Of the random draws behind the significance.
+    progress : callable
+        ``progress(iterable, total)`` returns the iterable, for a progress bar.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    MeasurementError, ParameterError
+        If measurement and model do not fit together.
+    """
+    return _Diagnostician(problem_for(model, measurements), jobs, seed, progress).run()
+
+
+class _Diagnostician:
+    """The procedure with its state: what was found, and the fit with it."""
+
+    def __init__(self, problem, jobs, seed, progress):
+        self.problem = problem
+        self.fitter = Fitter(problem)
+        self.jobs = jobs
+        self.progress = progress
+        self.rng = np.random.default_rng(seed)
+        self.fixed = list(problem.model.effects)
+        self.known: list = []
+        self.current = self._refit([])
+        self.base = self.current
+        self.before = self.fitter.error(self.base.held_out)
+
+    def _refit(self, known):
+        fit = self.fitter.fit(self.fixed, known)
+        return self.fitter.cross_validate(self.fixed, fit)
+
+    def run(self) -> Diagnosis:
+        """Search, check, and sum up."""
+        problem = self.problem
+        self._draw_structure()
+        names, hopeless = possible(problem, [])
+        first = rivals = consider_all(
+            self.fitter, [], self.current, names, self.jobs, self.progress)
+        self._test(first, self.current)
+        rivals_of = {}
+        while len(self.known) < MOST_EFFECTS:
+            chosen = self._choose(rivals)
+            if chosen is None:
+                break
+            self.known = chosen.fit.effects
+            self.current = chosen.fit
+            rivals_of[chosen.id] = rivals
+            self._drop()
+            if self._good_enough() or len(self.known) == MOST_EFFECTS:
+                break
+            again = [name for name in self._worth_another_look(first)
+                     if name not in {effect.id for effect in self.known}]
+            rivals = consider_all(self.fitter, self.known, self.current, again, self.jobs,
+                                  self.progress)
+            self._test(rivals, self.current)
+        if len(self.known) > 1:
+            self._exchange(first)
+        return self._sum_up(first, hopeless)
+
+    def _draw_structure(self):
+        problem = self.problem
+        if problem.refits:
+            self.structure = 0.0
+            self.decoys = None
+            return
+        decoys = structure.decoys(problem, self.fixed, self.base.predicted, self.rng)
+        self.decoys = STRUCTURE_MARGIN * decoys
+        self.structure = float(np.sqrt(np.mean(decoys ** 2)))
+
+    @property
+    def floor(self) -> float:
+        """What sensor and base model leave by themselves."""
+        return float(np.hypot(self.structure, self.problem.noise))
+
+    def _worth_another_look(self, first):
+        """Effects that have anything to say about what is left, judged by their signatures."""
+        left = self.problem.measured - self.current.predicted
+        columns = self.current.jacobian
+        worth = []
+        for candidate in first:
+            both = np.column_stack([columns, candidate.fit.jacobian, candidate.signature])
+            error = significance.held_out_errors(both, left[None, :], self.problem.fold)[0]
+            if error < (1.0 - PRACTICAL) * np.mean(left ** 2):
+                worth.append(candidate.id)
+        return worth
+
+    def _test(self, candidates: list[Candidate], current) -> None:
+        """Fill in the p values of candidates beside the `current` fit."""
+        if not candidates:
+            return
+        problem = self.problem
+        gains = np.array([candidate.gain for candidate in candidates])
+        error = problem.measured - current.held_out
+        if problem.refits:
+            blocks = np.stack([
+                significance.block_sums(
+                    error ** 2 - (problem.measured - candidate.fit.held_out) ** 2, problem.block)
+                for candidate in candidates])
+            values = significance.paired_p_values(blocks, self.rng)
+        else:
+            values = np.zeros(len(candidates))
+            for draws in (self.decoys, significance.flipped(error, problem.block, self.rng)):
+                chance = np.stack([
+                    self._chance(candidate, current, draws) for candidate in candidates])
+                values = np.maximum(values, significance.family_p_values(gains, chance))
+        for candidate, value in zip(candidates, values):
+            candidate.p_value = float(value)
+
+    def _chance(self, candidate, current, draws):
+        """Gain of the candidate in draws without an effect, shape (m,)."""
+        fold = self.problem.fold
+        before = significance.held_out_errors(current.jacobian, draws, fold)
+        after = significance.held_out_errors(candidate.fit.jacobian, draws, fold)
+        return before - after
+
+    def _significant(self, candidate, current) -> bool:
+        before, after = self.fitter.error(current.held_out), candidate.rmse
+        if candidate.p_value > SIGNIFICANCE or after > (1.0 - PRACTICAL) * before:
+            return False
+        measured, block = self.problem.measured, self.problem.block
+        gains = significance.block_sums(
+            (measured - current.held_out) ** 2 - (measured - candidate.fit.held_out) ** 2, block)
+        return bool(np.mean(gains > 0.0) >= CONSISTENT)
+
+    def _choose(self, candidates) -> Candidate | None:
+        """Best significant effect; a plausible one goes before any that is not."""
+        significant = [candidate for candidate in candidates
+                       if self._significant(candidate, self.current)]
+        plausible = [candidate for candidate in significant if not candidate.implausible]
+        return plausible[0] if plausible else None
+
+    def _good_enough(self) -> bool:
+        return self.fitter.error(self.current.held_out) <= self.floor
+
+    def _drop(self) -> None:
+        """Take out effects that a later one has made needless."""
+        for effect in self.known[:-1]:
+            others = [other for other in self.known if other is not effect]
+            without = self._refit(others)
+            limit = (1.0 + PRACTICAL) * self.fitter.error(self.current.held_out)
+            if self.fitter.error(without.held_out) <= limit:
+                self.known, self.current = without.effects, without
+                return
+
+    def _exchange(self, first) -> None:
+        """Try for every effect of a set whether another does better in its place."""
+        for position in range(len(self.known)):
+            others = [effect for index, effect in enumerate(self.known) if index != position]
+            taken = {effect.id for effect in self.known}
+            names = [candidate.id for candidate in first if candidate.id not in taken][:RIVALS]
+            without = self._refit(others)
+            rivals = consider_all(self.fitter, others, without, names, self.jobs, self.progress)
+            better = [candidate for candidate in rivals if not candidate.implausible
+                      and candidate.rmse < (1.0 - PRACTICAL) * self.fitter.error(
+                          self.current.held_out)]
+            if better:
+                self.known, self.current = better[0].fit.effects, better[0].fit
+
+    def _alternatives(self, first) -> list:
+        """For each missing effect, those that could as well be the truth in its place."""
+        result = []
+        for effect in self.known:
+            others = [other for other in self.known if other is not effect]
+            taken = {other.id for other in self.known}
+            if others:
+                without = self._refit(others)
+                names = [c.id for c in first if c.id not in taken][:RIVALS]
+                rivals = consider_all(
+                    self.fitter, others, without, names, self.jobs, self.progress)
+            else:
+                without = self.base
+                rivals = [candidate for candidate in first if candidate.id not in taken]
+            close = [rival for rival in rivals
+                     if not rival.implausible and self._could_be(rival, without)]
+            result.append([rival.id for rival in close[:MOST_ALTERNATIVES]])
+        return result
+
+    def _could_be(self, rival: Candidate, without) -> bool:
+        """
+        Whether the rival could be the truth although the chosen set fits better.
+
+        If the rival were the truth, the data would be its response with the base model's error;
+        how far behind would it then fall by chance? A test of models that do not contain each
+        other, by simulation.
+        """
+        problem = self.problem
+        margin = rival.rmse ** 2 - self.fitter.error(self.current.held_out) ** 2
+        if margin <= 0.0:
+            return True
+        if problem.refits:
+            low, _ = significance.gain_interval(
+                problem.measured - rival.fit.held_out,
+                problem.measured - self.current.held_out, problem.block, self.rng)
+            return low <= 0.0
+        if rival.rmse > 2.0 * max(self.floor, self.fitter.error(self.current.held_out)):
+            return False
+        draws = self.decoys
+        own = significance.held_out_errors(rival.fit.jacobian, draws, problem.fold)
+        shift = rival.fit.predicted - self.current.predicted
+        other = significance.held_out_errors(
+            self.current.jacobian, draws + shift, problem.fold)
+        return bool(margin <= np.quantile(own - other, 0.95))
+
+    def _sum_up(self, first, hopeless) -> Diagnosis:
+        problem = self.problem
+        after = self.fitter.error(self.current.held_out)
+        residual = problem.measured - self.current.held_out
+        left = leftover.examine(problem, residual)
+        limit = self._limit()
+        excess = max(after ** 2 - limit ** 2, 0.0) if after > limit else 0.0
+        unexplained = excess / max(self.before ** 2, 1e-300)
+        if problem.refits:
+            unexplained = left.explained * (after / self.before) ** 2
+        named = bool(self.known)
+        hidden = self._hidden(first, hopeless, limit)
+        if unexplained > UNEXPLAINED:
+            verdict = 'unknown'
+        elif named:
+            verdict = 'missing'
+        elif not problem.refits and hidden and len(hidden) > 0.8 * max(len(first), 1):
+            verdict = 'not_excited'
+        else:
+            verdict = 'adequate'
+        alternatives = self._alternatives(first) if named else []
+        effects = self.fitter.with_intervals(self.current) if named else []
+        missing = [effect.id for effect in effects]
+        return Diagnosis(
+            verdict=verdict, missing=missing, alternatives=alternatives,
+            ranking=self._ranking(first, missing), noise_floor=problem.noise,
+            structural_error=self.structure, unexplained=float(min(unexplained, 1.0)),
+            experiment=self._experiment(verdict, missing, alternatives, {**hopeless, **hidden}),
+            effects=effects, rmse_before=self.before, rmse_after=after,
+            not_excited={**hopeless, **hidden},
+            event=left.event if left.event_share > 0.5 and verdict == 'unknown' else None,
+            signal=left.signal if verdict == 'unknown' else '')
+
+    def _limit(self) -> float:
+        """Largest error that base model and sensor may leave by themselves."""
+        if self.decoys is None:
+            return self.floor
+        return float(np.quantile(np.sqrt(np.mean(self.decoys ** 2, axis=1)), 0.95))
+
+    def _hidden(self, first, hopeless, limit) -> dict:
+        """Effects that even at the upper end of their range would not stand out here."""
+        hidden = {}
+        for candidate in first:
+            strongest = catalogue()[candidate.id](self.problem.model.surroundings)
+            strongest = strongest.with_values(**{
+                parameter.name: (parameter.choices[-1] if parameter.choices else parameter.high)
+                for parameter in strongest.parameters if self.problem.kind in parameter.kinds})
+            if self.problem.refits:
+                continue
+            changed = self.problem.simulate([*self.fixed, strongest]) - self.base.predicted
+            size = float(np.sqrt(np.mean(changed ** 2)))
+            if np.isfinite(size) and size < 0.3 * limit:
+                hidden[candidate.id] = 'even a strong one would change less than the noise'
+        return hidden
+
+    def _ranking(self, first, missing) -> list:
+        problem = self.problem
+        if not first:
+            return []
+        columns = problem.weight_columns(self.fixed)
+        signatures = np.stack([candidate.signature for candidate in first])
+        alike = significance.cosines(signatures)
+        left = significance.residualise(columns, signatures)
+        size = np.linalg.norm(signatures, axis=1)
+        absorbed = 1.0 - (np.linalg.norm(left, axis=1) / np.maximum(size, 1e-300)) ** 2
+        measured = problem.measured
+        rows = []
+        for index, candidate in enumerate(first):
+            low, high = significance.gain_interval(
+                measured - self.base.held_out, measured - candidate.fit.held_out, problem.block,
+                self.rng)
+            effect = self.fitter.with_intervals(candidate.fit)[-1]
+            rows.append({
+                'effect': candidate.id, 'rmse_before': self.before, 'rmse_after': candidate.rmse,
+                'gain': 1.0 - candidate.rmse / self.before, 'gain_low': low, 'gain_high': high,
+                'p_value': candidate.p_value, 'parameters': effect.to_dict()['parameters'],
+                'plausible': not candidate.implausible,
+                'absorbed': float(np.clip(absorbed[index], 0.0, 1.0)),
+                'confused_with': [other.id for other, cosine in zip(first, alike[index])
+                                  if other is not candidate and cosine > CONFUSED]})
+        order = {name: position for position, name in enumerate(missing)}
+        return sorted(rows, key=lambda row: (order.get(row['effect'], len(order)),
+                                             not row['plausible'], row['rmse_after']))
+
+    def _experiment(self, verdict, missing, alternatives, hidden) -> str:
+        effects = catalogue()
+        if verdict == 'unknown':
+            return ('repeat the recording with another sequence of the drive and look at the '
+                    'residual; no effect of the catalogue explains it')
+        for name, others in zip(missing, alternatives):
+            if others:
+                return (f'to tell {name} from {" and ".join(others)}: '
+                        + '; '.join(effects[one].experiment for one in [name, *others]))
+        if missing:
+            return (f'record again after `extend --add {",".join(missing)}` and compare')
+        if hidden:
+            name = next(iter(hidden))
+            return f'to see {name}, too: {effects[name].experiment}'
+        return 'nothing: the model explains this recording'
+
+
+__all__ = ['Diagnosis', 'consider', 'diagnose']

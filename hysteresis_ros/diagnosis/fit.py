@@ -1,0 +1,206 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Fit the parameters of effects to measured rows, and test the fit on rows that were held out."""
+
+import dataclasses
+
+import numpy as np
+from scipy import optimize, stats
+
+from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+
+# Simulated responses are smooth only on this scale of the parameters' units.
+DIFFERENCE = 0.02
+# Starts that are followed to the end after all were tried once.
+FOLLOWED_STARTS = 2
+MOST_EVALUATIONS = 8
+HELD_OUT_EVALUATIONS = 3
+
+
+@dataclasses.dataclass
+class Fit:
+    """
+    Effects fitted to some rows.
+
+    Attributes
+    ----------
+    effects : list of Effect
+        The fitted ones, with values; those that stayed fixed are not among them.
+    vector : ndarray, shape (k,)
+        Their free parameters in the units of `ParameterVector`.
+    predicted : ndarray, shape (n,)
+        Response of all rows with them.
+    jacobian : ndarray, shape (n, k)
+        Derivatives of `predicted`.
+    held_out : ndarray, shape (n,)
+        Response of every row as predicted by a fit to the other folds; see `cross_validate`.
+    """
+
+    effects: list
+    vector: np.ndarray
+    predicted: np.ndarray
+    jacobian: np.ndarray
+    held_out: np.ndarray | None = None
+
+    def implausible(self) -> list:
+        """Names of parameters outside their physical range or at the end of the widened one."""
+        names = [f'{effect.id}.{name}' for effect in self.effects
+                 for name in effect.implausible()]
+        return names
+
+
+class Fitter:
+    """
+    Fits effects on one problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and model.
+    """
+
+    def __init__(self, problem):
+        self.problem = problem
+
+    def _respond(self, fixed, parameters, train):
+        kept = [effect for effect in fixed]
+
+        def respond(vector):
+            return self.problem.simulate(kept + parameters.with_vector(vector), train)
+        return respond
+
+    def fit(self, fixed, effects, rows=None, evaluations=MOST_EVALUATIONS) -> Fit:
+        """
+        Fit from the present values of `effects`.
+
+        Parameters
+        ----------
+        fixed : sequence of Effect
+            Effects of the model that are not fitted.
+        effects : sequence of Effect
+            Effects to fit; their values are the start.
+        rows : ndarray of bool, shape (n,), optional
+            Rows to fit; all by default.
+        evaluations : int
+            Steps of the optimiser at most.
+
+        Returns
+        -------
+        Fit
+        """
+        problem = self.problem
+        parameters = ParameterVector(effects, problem.kind)
+        respond = self._respond(fixed, parameters, rows)
+        rows = np.ones(len(problem.measured), dtype=bool) if rows is None else rows
+        measured = problem.measured[rows]
+        scale = max(float(np.std(problem.measured)), 1e-12)
+        if len(parameters) == 0:
+            predicted = respond(np.zeros(0))
+            return Fit(list(effects), np.zeros(0), predicted, np.zeros((len(predicted), 0)))
+        inside = 1e-6 * (parameters.upper - parameters.lower)
+        start = np.clip(parameters.vector(), parameters.lower + inside,
+                        parameters.upper - inside)
+        cache: dict[bytes, np.ndarray] = {}
+
+        def full(vector):
+            key = np.asarray(vector).tobytes()
+            if key not in cache:
+                cache[key] = respond(vector)
+            return cache[key]
+
+        def jacobian(vector):
+            centre = full(vector)
+            columns = []
+            for k in range(len(vector)):
+                step = DIFFERENCE if vector[k] + DIFFERENCE < parameters.upper[k] else -DIFFERENCE
+                moved = np.array(vector)
+                moved[k] += step
+                columns.append((full(moved) - centre) / step)
+            return np.column_stack(columns)
+
+        found = optimize.least_squares(
+            lambda vector: (full(vector)[rows] - measured) / scale, start,
+            jac=lambda vector: jacobian(vector)[rows] / scale,
+            bounds=(parameters.lower, parameters.upper), method='trf', x_scale=1.0,
+            xtol=1e-4, ftol=1e-5, gtol=1e-8, max_nfev=evaluations)
+        return Fit(parameters.with_vector(found.x), found.x, full(found.x), jacobian(found.x))
+
+    def search(self, fixed, known, effect, rows=None) -> Fit:
+        """
+        Fit `effect` together with the `known` ones, from the best of its starts.
+
+        Parameters
+        ----------
+        fixed, rows
+            As for `fit`.
+        known : sequence of Effect
+            Effects found before, fitted again beside the new one.
+        effect : Effect
+            The new one; its values are not looked at.
+        """
+        mask = slice(None) if rows is None else rows
+        measured = self.problem.measured[mask]
+
+        def error(candidate):
+            predicted = self.problem.simulate([*fixed, *known, candidate], rows)
+            return float(np.mean((predicted[mask] - measured) ** 2))
+
+        starts = sorted(starts_of(effect, self.problem.kind), key=error)
+        fits = [self.fit(fixed, [*known, start], rows) for start in starts[:FOLLOWED_STARTS]]
+        return min(fits, key=lambda fit: self.error(fit.predicted, mask))
+
+    def error(self, predicted, rows=slice(None)) -> float:
+        """Root mean square error of some rows."""
+        return float(np.sqrt(np.mean((predicted[rows] - self.problem.measured[rows]) ** 2)))
+
+    def cross_validate(self, fixed, fit: Fit) -> Fit:
+        """
+        Fill in `held_out`: every fold predicted by a fit to the others, simulated anew.
+
+        The fit to all rows is the start; where the effects' parameters are all that is fitted, a
+        Gauss-Newton step from there is as good as a new search.
+        """
+        problem = self.problem
+        held_out = np.empty(len(problem.measured))
+        parameters = ParameterVector(fit.effects, problem.kind)
+        for fold in problem.folds:
+            test = problem.fold == fold
+            if problem.refits:
+                refit = self.fit(fixed, fit.effects, ~test, HELD_OUT_EVALUATIONS)
+                held_out[test] = refit.predicted[test]
+                continue
+            vector = fit.vector
+            if len(vector):
+                jacobian = fit.jacobian[~test]
+                error = (problem.measured - fit.predicted)[~test]
+                ridge = 1e-6 * np.trace(jacobian.T @ jacobian) / len(vector) + 1e-300
+                step = np.linalg.solve(
+                    jacobian.T @ jacobian + ridge * np.eye(len(vector)), jacobian.T @ error)
+                vector = np.clip(vector + np.clip(step, -1.0, 1.0), parameters.lower,
+                                 parameters.upper)
+            predicted = problem.simulate([*fixed, *parameters.with_vector(vector)])
+            held_out[test] = predicted[test]
+        return dataclasses.replace(fit, held_out=held_out)
+
+    def with_intervals(self, fit: Fit, level: float = 0.95) -> list:
+        """
+        Return the fitted effects with intervals of their parameters.
+
+        From the Jacobian, with the residuals summed by block (a sandwich estimate), because
+        residuals of a simulated response hang together.
+        """
+        parameters = ParameterVector(fit.effects, self.problem.kind)
+        if len(parameters) == 0:
+            return fit.effects
+        jacobian = fit.jacobian
+        error = self.problem.measured - fit.predicted
+        gram = jacobian.T @ jacobian
+        inverse = np.linalg.pinv(gram, rcond=1e-10)
+        scores = np.stack([jacobian[rows].T @ error[rows] for rows in (
+            self.problem.block == block for block in np.unique(self.problem.block))])
+        count = len(scores)
+        factor = count / max(count - len(parameters), 1)
+        covariance = factor * inverse @ (scores.T @ scores) @ inverse
+        half = stats.t.ppf(0.5 + level / 2.0, max(count - len(parameters), 1)) * np.sqrt(
+            np.maximum(np.diag(covariance), 0.0))
+        return parameters.with_intervals(fit.vector, half)

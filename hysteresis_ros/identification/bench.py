@@ -1,0 +1,301 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From bench tables to a model of the muscle (Sec. IV-B of the paper).
+
+H1 is fitted to the force table, ``z = F - H1[V]`` is formed for the length table (Eq. 10 as it has
+to be: z is the input, the measured length the target), and H2 is fitted to it. Every trial starts
+from the cold state after a full heat and cool cycle, so before its first row the cold drive is
+applied to a saturated memory.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import optimize
+
+from hysteresis_ros import __version__
+from hysteresis_ros.diagnosis.metrics import errors
+from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.identification.least_squares import WeightFit
+from hysteresis_ros.identification.operators import fit_operator
+from hysteresis_ros.model import LinearModel, MuscleModel
+from hysteresis_ros.operators import Linear
+
+LEVELS = (10, 20)
+OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
+
+
+@dataclasses.dataclass
+class Identified:
+    """
+    A model with the fits that it came from.
+
+    Attributes
+    ----------
+    model : MuscleModel
+        Operators, linear model, ranges, metrics.
+    force_fit, length_fit : WeightFit or None
+        Results of the least squares, with rank, cells never excited and intervals; None where the
+        stage has no weights or was not identified.
+    """
+
+    model: MuscleModel
+    force_fit: WeightFit | None
+    length_fit: WeightFit | None
+
+
+def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray:
+    """
+    Say which rows belong to the trials named; all of them by default.
+
+    Raises
+    ------
+    IdentificationError
+        If a trial is not in the table.
+    """
+    column = measurement.column('trial')
+    if trials is None:
+        return np.ones(len(column), dtype=bool)
+    absent = sorted(set(trials) - set(np.unique(column).tolist()))
+    if absent:
+        there = ', '.join(f'{trial:g}' for trial in np.unique(column))
+        raise IdentificationError(
+            f'{measurement.source}: no {name} trial {", ".join(f"{t:g}" for t in absent)}; there '
+            f'are {there}')
+    return np.isin(column, list(trials))
+
+
+def identify(length=None, force=None, *, force_trials=None, length_trials=None, geometry=None,
+             levels: Sequence[int] = LEVELS, operator: str | None = None,
+             anchored: bool = False) -> Identified:
+    """
+    Identify the muscle from bench tables.
+
+    Parameters
+    ----------
+    length : Measurement, optional
+        Drive, load where there is one, and length or strain.
+    force : Measurement, optional
+        Drive and force at resting length.
+    force_trials, length_trials : sequence of numbers, optional
+        Trials to fit; the others verify. Default: all are fitted.
+    geometry : BicepGeometry, optional
+        The arm, kept in the model.
+    levels : (int, int)
+        N1 and N2.
+    operator : {'two-stage', 'preisach', 'play', 'bouc-wen', 'linear'}, optional
+        Default 'two-stage' with a load, else 'preisach'. 'preisach' is one operator of the drive;
+        the others are the two-stage cascade made of such operators.
+    anchored : bool
+        Whether H1(0) is tied to the first force of the cold muscle and H2(0) to zero.
+
+    Returns
+    -------
+    Identified
+
+    Raises
+    ------
+    IdentificationError
+        If the tables do not suffice or do not fit together.
+    """
+    if length is None and force is None:
+        raise IdentificationError('nothing to identify; give a length table, a force table or both')
+    loaded = length is not None and length.load is not None
+    operator = operator or ('two-stage' if loaded or length is None else 'preisach')
+    if operator not in OPERATORS:
+        raise IdentificationError(
+            f'no operator {operator!r}; there are {", ".join(OPERATORS)}')
+    if force is not None and length is not None and force.drive != length.drive:
+        raise IdentificationError(f'the force table is driven by {force.drive}, the length table '
+                                  f'by {length.drive}; they have to be of one muscle')
+    if min(levels) < 1:
+        raise IdentificationError(f'levels must be positive, not {levels}')
+    kind = 'preisach' if operator in ('two-stage', 'preisach') else operator
+    some = length if length is not None else force
+    model = MuscleModel(
+        'preisach' if operator == 'preisach' else 'two-stage', some.drive,
+        length.load if loaded else None, length.response if length is not None else 'force',
+        None, geometry=geometry)
+    _set_ranges(model, length, force)
+    force_fit = length_fit = None
+    if force is not None:
+        rows = choose_trials(force, force_trials, 'force')
+        model.force_stage, force_fit = _force_stage(model, force, rows, levels[0], kind, anchored)
+    if length is not None:
+        rows = choose_trials(length, length_trials, 'length')
+        if operator == 'preisach' or not loaded:
+            length_fit = _drive_stage(model, length, rows, levels[1], kind)
+        else:
+            if model.force_stage is None:
+                model.force_stage = _first_stage_from_lengths(model, length, rows, levels)
+            length_fit = _length_stage(model, length, rows, levels[1], kind, anchored)
+    model.linear = _linear(model, force, force_trials, length, length_trials)
+    _measure(model, force, force_trials, length, length_trials)
+    model.provenance = _provenance(force, force_trials, length, length_trials)
+    return Identified(model, force_fit, length_fit)
+
+
+def _set_ranges(model, length, force):
+    for measurement in (force, length):
+        if measurement is None:
+            continue
+        for name in (measurement.drive, measurement.load, measurement.response):
+            if name is None:
+                continue
+            values = measurement.column(name)
+            low, high = model.ranges.get(name, (np.inf, -np.inf))
+            model.ranges[name] = (float(min(low, values.min())), float(max(high, values.max())))
+    if model.load_name is not None:
+        model.mean_load = float(np.mean(length.column(model.load_name)))
+
+
+def _parts(measurement, rows):
+    """Slices of the chosen trials, in the order of the file."""
+    return [(trial, part) for trial, part in measurement.split() if rows[part.start]]
+
+
+def _force_stage(model, force, rows, levels, kind, anchored):
+    """Fit H1 to force against drive."""
+    drive, target = force.column(model.drive), force.column('force')
+    parts = [np.concatenate(([model.cold_drive], drive[part])) for _, part in _parts(force, rows)]
+    anchor = (model.cold_drive, float(target[rows][0])) if anchored else None
+    return fit_operator(kind, parts, target[rows], force.column('trial')[rows], levels,
+                        anchor=anchor)
+
+
+def _second_inputs(model, length, rows):
+    """Inputs of H2 for each trial, the cold one first."""
+    drive = length.column(model.drive)
+    load = length.column(model.load_name) if model.load_name else np.zeros(len(drive))
+    parts = []
+    for _, part in _parts(length, rows):
+        x = drive[part]
+        cold = model.cold_drive
+        if model.force_stage is not None:
+            model.force_stage.reset()
+            cold = model.force_stage.step(cold)
+            x = model.force_stage.simulate(x)
+            parts.append(np.concatenate(([load[part][0] - cold], load[part] - x)))
+        else:
+            parts.append(model.sign * np.concatenate(([cold], x)))
+    return parts
+
+
+def _length_stage(model, length, rows, levels, kind, anchored=False):
+    """Fit H2 to length against F - H1[V]."""
+    anchor = (0.0, 0.0) if anchored else None
+    model.length_stage, fit = fit_operator(
+        kind, _second_inputs(model, length, rows), length.column(model.response)[rows],
+        length.column('trial')[rows], levels, anchor=anchor)
+    return fit
+
+
+def _drive_stage(model, length, rows, levels, kind):
+    """Fit one operator of the drive, of the sign that fits better."""
+    results = []
+    for sign in (-1, 1):
+        model.sign = sign
+        fit = _length_stage(model, length, rows, levels, kind)
+        predicted = model.predict(length)
+        rmse = float(np.sqrt(np.mean((predicted - length.column(model.response))[rows] ** 2)))
+        results.append((rmse, sign, model.length_stage, fit))
+    _, model.sign, model.length_stage, fit = min(results, key=lambda result: result[0])
+    return fit
+
+
+def _first_stage_from_lengths(model, length, rows, levels):
+    """
+    Find H1 without a force table: the load that one unit of drive stands for.
+
+    H1 is a straight line whose slope lets H2 explain the lengths best, so the load is weighed
+    against the drive in the one way that the lengths themselves show.
+    """
+    low, high = model.ranges[model.drive]
+    load_low, load_high = model.ranges[model.load_name]
+    usual = max(load_high - load_low, abs(load_high), 1e-12) / max(high - low, 1e-12)
+    column = length.column(model.response)[rows]
+
+    def line(log_slope):
+        slope = usual * np.exp(log_slope)
+        return Linear(slope, -slope * low, min(low, model.cold_drive), high)
+
+    def rmse(log_slope):
+        model.force_stage = line(log_slope)
+        parts = _second_inputs(model, length, rows)
+        operator, _ = fit_operator('preisach', parts, column, length.column('trial')[rows],
+                                   levels[1], strength=1e-3)
+        outputs = []
+        for part in parts:
+            operator.reset()
+            outputs.append(operator.simulate(part)[1:])
+        return float(np.mean((np.concatenate(outputs) - column) ** 2))
+
+    grid = np.linspace(-2.0, 4.0, 13)
+    values = [rmse(value) for value in grid]
+    best = grid[int(np.argmin(values))]
+    found = optimize.minimize_scalar(rmse, bounds=(best - 0.5, best + 0.5), method='bounded',
+                                     options={'xatol': 0.02})
+    return line(found.x if found.fun < min(values) else best)
+
+
+def _linear(model, force, force_trials, length, length_trials):
+    """Fit Eq. 11 as the paper does: a line through the forces, then one through the lengths."""
+    if force is not None:
+        rows = choose_trials(force, force_trials, 'force')
+        k1, offset = np.polyfit(force.column(model.drive)[rows], force.column('force')[rows], 1)
+        if length is None:
+            return LinearModel(float(k1), 1.0, float(offset))
+        rows = choose_trials(length, length_trials, 'length')
+        z = length.column(model.load_name)[rows] if model.load_name else np.zeros(rows.sum())
+        z = z - k1 * length.column(model.drive)[rows] - offset
+        k2 = float(z @ length.column(model.response)[rows] / (z @ z))
+        return LinearModel(float(k1), k2, float(offset))
+    rows = choose_trials(length, length_trials, 'length')
+    drive, target = length.column(model.drive)[rows], length.column(model.response)[rows]
+    if model.load_name:
+        columns = np.column_stack([length.column(model.load_name)[rows], drive, np.ones(len(drive))])
+        scale = np.abs(columns).max(axis=0)
+        by_load, by_drive, offset = np.linalg.lstsq(
+            columns / scale, target, rcond=None)[0] / scale
+        if by_load != 0.0:
+            return LinearModel(float(-by_drive / by_load), float(by_load),
+                               float(-offset / by_load))
+    by_drive, offset = np.polyfit(drive, target, 1)
+    return LinearModel(float(-by_drive), 1.0, float(-offset))
+
+
+def _measure(model, force, force_trials, length, length_trials):
+    """Fill in the metrics: errors on fitted and on other trials, of both methods."""
+    for name, measurement, trials in (('force', force, force_trials),
+                                      ('length', length, length_trials)):
+        if measurement is None:
+            continue
+        rows = choose_trials(measurement, trials, name)
+        measured = measurement.column(measurement.response)
+        span = float(np.ptp(measured))
+        predicted = {method: model.predict(measurement, method)
+                     for method in ('preisach', 'linear')}
+        entry = {}
+        for part, chosen in (('identification', rows), ('verification', ~rows)):
+            if np.any(chosen):
+                entry[part] = {
+                    label: errors((predicted[method] - measured)[chosen], span).to_json()
+                    for label, method in (('model', 'preisach'), ('linear', 'linear'))}
+                entry[part]['rmse'] = entry[part]['model']['rmse']
+                entry[part]['rows'] = int(np.count_nonzero(chosen))
+        model.metrics[name] = entry
+
+
+def _provenance(force, force_trials, length, length_trials):
+    entries = {'hysteresis_ros': __version__, 'numpy': np.__version__}
+    for name, measurement, trials in (('force', force, force_trials),
+                                      ('length', length, length_trials)):
+        if measurement is not None:
+            rows = choose_trials(measurement, trials, name)
+            entries[name] = {
+                'source': str(measurement.source).rsplit('/', 1)[-1],
+                'sha256': measurement.digest,
+                'trials': sorted({float(t) for t in measurement.column('trial')[rows]})}
+    return entries
