@@ -354,35 +354,68 @@ def settled_rows(measurement, hold=SETTLED_HOLD, average=1.0):
     Returns
     -------
     Measurement or None
-        One row a hold; `time` is the end of the hold. None if the drive is not held (a
-        shorter hold that is not at an end of its trial), because such a run has no settled
-        rows. A settled measurement is returned as it is.
+        One row a hold; `time` is the end of the hold. None if the drive is not held, because
+        such a run has no settled rows. A settled measurement is returned as it is.
 
     """
     if measurement.settled:
         return measurement
+    windows = hold_ends(measurement, hold, average)
+    if windows is None:
+        return None
+    exact = ('time', 'trial', 'step', measurement.drive)
+    return replace(measurement, columns={
+        name: values[windows[:, 1] - 1] if name in exact else mean_of_windows(values, windows)
+        for name, values in measurement.columns.items()})
+
+
+def hold_ends(measurement, hold=SETTLED_HOLD, average=1.0):
+    """
+    Find the rows at the end of every hold.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        With times.
+    hold, average : float
+        As for `settled_rows`.
+
+    Returns
+    -------
+    ndarray of int (holds, 2) or None
+        First row that is averaged and row after the last. None if a hold is shorter, unless it
+        begins or ends its trial, or if there is none.
+
+    """
     time = measurement.time
-    rows_of_holds = []
+    found = []
     for _, rows in measurement.split():
         for low, high in holds(measurement.column(measurement.drive), rows):
             end = time[high] if high < rows.stop else time[high - 1]
             if end - time[low] >= hold * (1 - 1e-3):
-                rows_of_holds.append((low, high))
+                begin = np.searchsorted(time[low:high], time[high - 1] - average, side='left')
+                found.append((low + int(begin), high))
             elif low > rows.start and high < rows.stop:
                 return None
-    if not rows_of_holds:
-        return None
-    ends = np.array([high - 1 for _, high in rows_of_holds])
-    first = [low + np.searchsorted(time[low:high], time[high - 1] - average, side='left')
-             for low, high in rows_of_holds]
-    columns = {}
-    for name, values in measurement.columns.items():
-        if name in ('time', 'trial', 'step', measurement.drive):
-            columns[name] = values[ends]
-        else:
-            columns[name] = np.array([values[low:end + 1].mean()
-                                      for low, end in zip(first, ends)])
-    return replace(measurement, columns=columns)
+    return np.array(found) if found else None
+
+
+def mean_of_windows(values, windows):
+    """
+    Average a column over windows of rows.
+
+    Parameters
+    ----------
+    values : ndarray, (rows,)
+    windows : ndarray of int (n, 2)
+        As `hold_ends` gives them.
+
+    Returns
+    -------
+    ndarray of float64 (n,)
+
+    """
+    return np.array([values[low:high].mean() for low, high in windows])
 
 
 def holds(drive, rows, tolerance=1e-3):

@@ -1,0 +1,186 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How far a prediction is off (Eqs. 23 and 24), and how near it can come at all."""
+
+from typing import NamedTuple
+
+from hysteresis_ros.measurements import settled_rows
+import numpy as np
+
+FEWEST_REPEATED_ROWS = 5
+
+
+class Errors(NamedTuple):
+    """
+    Errors of a prediction over some rows.
+
+    Attributes
+    ----------
+    mean_abs : float
+        Mean of |e|, in the unit of the response.
+    std : float
+        Standard deviation of e, divided by M as Eq. 24 needs (its print leaves the M out).
+    rmse : float
+        Root of the mean of e^2.
+    mean_percent, std_percent : float
+        The first two as a share of the output range in percent: Eqs. 23 and 24. NaN where the
+        response does not vary.
+
+    """
+
+    mean_abs: float
+    std: float
+    rmse: float
+    mean_percent: float
+    std_percent: float
+
+    def to_json(self):
+        """Return the numbers by name; those that are not finite become None."""
+        return {name: finite(value) for name, value in self._asdict().items()}
+
+
+def errors(residual, output_range):
+    """
+    Return the errors of Eqs. 23 and 24 and the RMSE.
+
+    Parameters
+    ----------
+    residual : ndarray, (rows,)
+        Measured less predicted.
+    output_range : float
+        P of Eqs. 23 and 24: largest less smallest measured output, same unit.
+
+    Returns
+    -------
+    Errors
+
+    """
+    mean_abs = float(np.mean(np.abs(residual)))
+    std = float(np.sqrt(np.mean((residual - np.mean(residual)) ** 2)))
+    rmse = float(np.sqrt(np.mean(residual ** 2)))
+    percent = 100.0 / output_range if output_range > 0 else np.nan
+    return Errors(mean_abs, std, rmse, mean_abs * percent, std * percent)
+
+
+def finite(value):
+    """Return a float that JSON can hold, or None."""
+    return float(value) if np.isfinite(value) else None
+
+
+class Floor(NamedTuple):
+    """
+    What no model of the recorded inputs can be better than.
+
+    Attributes
+    ----------
+    value : float
+        RMSE in the unit of the response.
+    origin : str
+        'repeats' (the same input applied again), 'samples' (what changes from sample to sample
+        of a continuous run) or 'resolution' (the steps of the sensor).
+
+    """
+
+    value: float
+    origin: str
+
+
+def noise_floor(measurements):
+    """
+    Estimate the noise of the response from the recordings alone.
+
+    Parameters
+    ----------
+    measurements : list of Measurement
+
+    Returns
+    -------
+    Floor
+        The largest of what repeats, samples and resolution show: each is a lower bound.
+
+    """
+    found = [Floor(max(resolution_noise(m) for m in measurements), 'resolution')]
+    repeated = repeat_noise(measurements)
+    if repeated is not None:
+        found.append(Floor(repeated, 'repeats'))
+    sampled = [sample_noise(m) for m in measurements if not m.settled]
+    if sampled:
+        found.append(Floor(max(sampled), 'samples'))
+    return max(found, key=lambda floor: floor.value)
+
+
+def resolution_noise(measurement):
+    """
+    Return the standard deviation of rounding to the sensor's steps: step / sqrt(12).
+
+    Parameters
+    ----------
+    measurement : Measurement
+
+    Returns
+    -------
+    float
+        0 if no two rows differ.
+
+    """
+    values = np.unique(measurement.column(measurement.response))
+    steps = np.diff(values)
+    steps = steps[steps > 1e-9 * np.ptp(values)]
+    return float(steps.min() / np.sqrt(12.0)) if steps.size else 0.0
+
+
+def sample_noise(measurement):
+    """
+    Return the standard deviation of what is new in every sample of a continuous run.
+
+    White noise of standard deviation s makes second differences of variance 6 s^2, to which a
+    motion that is slow against the sampling adds nothing. The median resists steps of the drive.
+
+    Parameters
+    ----------
+    measurement : Measurement
+
+    Returns
+    -------
+    float
+
+    """
+    values = measurement.column(measurement.response)
+    seconds = [np.diff(values[rows], 2) for _, rows in measurement.split()]
+    seconds = np.concatenate(seconds)
+    if seconds.size < 10:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(seconds)) / np.sqrt(6.0))
+
+
+def repeat_noise(measurements):
+    """
+    Return the standard deviation between trials with the same inputs.
+
+    Parameters
+    ----------
+    measurements : list of Measurement
+
+    Returns
+    -------
+    float or None
+        None if no settled trial was repeated.
+
+    """
+    groups = {}
+    for measurement in measurements:
+        settled = settled_rows(measurement)
+        if settled is None:
+            continue
+        inputs = [settled.drive] + ([settled.load] if settled.load else [])
+        span = [max(np.ptp(settled.column(name)), 1e-12) for name in inputs]
+        for _, rows in settled.split():
+            if rows.stop - rows.start >= FEWEST_REPEATED_ROWS:
+                key = tuple(tuple(np.round(settled.column(name)[rows] / (1e-3 * size)))
+                            for name, size in zip(inputs, span))
+                groups.setdefault(key, []).append(settled.column(settled.response)[rows])
+    repeated = [np.array(trials) for trials in groups.values() if len(trials) > 1]
+    if not repeated:
+        return None
+    variance = np.concatenate([np.var(trials, axis=0, ddof=1) for trials in repeated])
+    return float(np.sqrt(np.mean(variance)))

@@ -1,0 +1,409 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The pictures of a comparison. Lines differ in shape and lightness, so that grey print keeps them.
+
+matplotlib is imported where something is drawn, through its figures alone: no window system and
+no global state.
+"""
+
+import base64
+import io
+
+from hysteresis_ros.diagnosis.signals import label
+from hysteresis_ros.diagnosis.where import binned, blocks_of, correlogram
+import numpy as np
+
+MOST_POINTS = 4000
+MOST_DOTS = 5000
+
+MEASURED = {'color': '#000000', 'linewidth': 1.3, 'linestyle': '-'}
+MODEL = {'color': '#2f6db5', 'linewidth': 1.3, 'linestyle': (0, (5, 1.5))}
+LINEAR = {'color': '#e6a03c', 'linewidth': 1.0, 'linestyle': (0, (1, 1.2))}
+DOTS = {'color': '#9aa7b5', 'markersize': 2.0, 'linestyle': 'none', 'marker': '.', 'alpha': 0.5}
+MEANS = {'color': '#12355b', 'linewidth': 1.4, 'marker': 'o', 'markersize': 3.5, 'capsize': 2.5}
+SIGNED = 'cividis'
+
+
+def figures(comparison):
+    """
+    Draw everything that a comparison has to show.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    dict of str to matplotlib.figure.Figure
+        By file name without suffix: `overlay`, `residual`, `signals`, `loop`, and where the
+        recording has what they need `plane`, `since_step`, `correlogram`, `coverage`.
+
+    """
+    drawn = {'overlay': overlay(comparison), 'signals': residual_against_signals(comparison),
+             'loop': residual_on_loop(comparison)}
+    drive, load = comparison.drive, load_of(comparison)
+    if load is not None:
+        drawn['plane'] = residual_on_plane(comparison, drive, load)
+    if 'time_since_step' in comparison.signals:
+        drawn['since_step'] = residual_since_step(comparison)
+    if comparison.rows >= 20:
+        drawn['correlogram'] = correlogram_of(comparison)
+    drawn['coverage'] = coverage(comparison)
+    return drawn
+
+
+def png(figure, dpi=110):
+    """
+    Render a figure.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    dpi : float
+
+    Returns
+    -------
+    bytes
+        A PNG file.
+
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure)
+    stream = io.BytesIO()
+    figure.savefig(stream, format='png', dpi=dpi)
+    return stream.getvalue()
+
+
+def data_address(picture):
+    """Return a PNG file's bytes as an address that a page can hold in itself."""
+    return 'data:image/png;base64,' + base64.b64encode(picture).decode('ascii')
+
+
+def new_figure(width, height, rows=1, columns=1, **options):
+    """Return a figure and its axes, ndarray of Axes (rows, columns)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout='constrained')
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    for axis in axes.flat:
+        axis.grid(True, color='#dddddd', linewidth=0.6)
+        axis.set_axisbelow(True)
+        for side in ('top', 'right'):
+            axis.spines[side].set_visible(False)
+        axis.tick_params(labelsize=8)
+    return figure, axes
+
+
+def axis_label(name):
+    """Return a signal's name and unit for an axis."""
+    text, unit, _ = label(name)
+    return f'{text} [{unit}]' if unit else text
+
+
+def scaled(name, values):
+    """Return values in the unit that `axis_label` names."""
+    return values * label(name)[2]
+
+
+def thinned(x, y, most=MOST_POINTS):
+    """
+    Leave out points that a line does not need: each stretch keeps its extremes.
+
+    Parameters
+    ----------
+    x, y : ndarray, (rows,)
+        x ascending.
+    most : int
+        About how many points may stay.
+
+    Returns
+    -------
+    x, y : ndarray
+
+    """
+    rows = len(y)
+    if rows <= most:
+        return x, y
+    size = -(-rows // (most // 2))
+    starts = np.arange(0, rows, size)
+    padded = np.concatenate([y, np.full(len(starts) * size - rows, y[-1])])
+    table = padded.reshape(len(starts), size)
+    chosen = np.unique(np.concatenate([
+        starts + table.argmin(axis=1), starts + table.argmax(axis=1), [0, rows - 1]]))
+    chosen = chosen[chosen < rows]
+    return x[chosen], y[chosen]
+
+
+def some_rows(rows, most=MOST_DOTS):
+    """Return evenly chosen rows, an index for scatter plots."""
+    return np.linspace(0, rows - 1, min(rows, most)).astype(int)
+
+
+def overlay(comparison):
+    """
+    Draw measured and predicted response, and below what is left.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    quantity = comparison.quantity
+    figure, axes = new_figure(9, 5.2, 2, 1, sharex=True, height_ratios=[2, 1])
+    top, bottom = axes[:, 0]
+    x, name = along(comparison)
+    if comparison.linear_predicted is not None:
+        top.plot(*thinned(x, scaled(quantity, comparison.linear_predicted)), label='linear',
+                 **LINEAR)
+    top.plot(*thinned(x, scaled(quantity, comparison.measured)), label='measured', **MEASURED)
+    top.plot(*thinned(x, scaled(quantity, comparison.predicted)), label=comparison.name, **MODEL)
+    if comparison.linear_predicted is not None:
+        left = comparison.measured - comparison.linear_predicted
+        bottom.plot(*thinned(x, scaled(quantity, left)), **LINEAR)
+    bottom.plot(*thinned(x, scaled(quantity, comparison.residual)), **MODEL)
+    bottom.axhline(0.0, color='black', linewidth=0.8)
+    noise = scaled(quantity, comparison.floor.value)
+    bottom.axhspan(-noise, noise, color='#cccccc', alpha=0.6, linewidth=0)
+    for start in x[np.flatnonzero(np.diff(comparison.trial)) + 1]:
+        for axis in (top, bottom):
+            axis.axvline(start, color='#888888', linewidth=0.7, linestyle=':')
+    top.set_ylabel(axis_label(quantity))
+    bottom.set_ylabel(f'measured - predicted\n[{label(quantity)[1] or "1"}]', fontsize=8)
+    bottom.set_xlabel(name)
+    top.legend(fontsize=8, ncols=3, frameon=False, loc='lower left', bbox_to_anchor=(0, 1))
+    return figure
+
+
+def along(comparison):
+    """Return what runs along a recording, (rows,), and its name: time, or the row's number."""
+    if comparison.time is None:
+        return np.arange(comparison.rows, dtype=float), 'row'
+    if comparison.time[-1] > 3 * 3600:
+        return comparison.time / 3600, 'time [h]'
+    if comparison.time[-1] > 600:
+        return comparison.time / 60, 'time [min]'
+    return comparison.time, 'time [s]'
+
+
+def residual_against_signals(comparison):
+    """
+    Draw the residual against every signal, with binned means and their 95 % intervals.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    names = list(comparison.signals)
+    columns = min(3, max(len(names), 1))
+    rows = -(-len(names) // columns) or 1
+    figure, axes = new_figure(9, 2.5 * rows, rows, columns, sharey=True)
+    residual = comparison.residual
+    block = blocks_of(residual, comparison.trial)
+    for axis, name in zip(axes.flat, names):
+        against(axis, comparison, name, comparison.signals[name], residual, block)
+    for axis in axes.flat[len(names):]:
+        axis.set_visible(False)
+    for axis in axes[:, 0]:
+        axis.set_ylabel(f'measured - predicted\n[{label(comparison.quantity)[1] or "1"}]',
+                        fontsize=8)
+    return figure
+
+
+def against(axis, comparison, name, values, residual, block):
+    """Draw the residual against one signal into an axis."""
+    quantity = comparison.quantity
+    chosen = some_rows(len(values))
+    axis.plot(scaled(name, values[chosen]), scaled(quantity, residual[chosen]), **DOTS)
+    bins = binned(name, values, residual, block)
+    half = np.where(np.isfinite(bins.half), bins.half, 0.0)
+    axis.errorbar(scaled(name, bins.centre), scaled(quantity, bins.mean),
+                  scaled(quantity, half), **MEANS)
+    axis.axhline(0.0, color='black', linewidth=0.8)
+    largest = scaled(quantity, float(np.max(np.abs(bins.mean) + half)))
+    spread = scaled(quantity, float(np.quantile(np.abs(residual), 0.995)))
+    limit = 1.1 * max(largest if largest < 3 * spread else spread, spread, 1e-12)
+    axis.set_ylim(-limit, limit)
+    axis.set_xlabel(axis_label(name), fontsize=8)
+
+
+def residual_on_loop(comparison):
+    """
+    Draw the hysteresis loop, measured and predicted, coloured by the residual.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    figure, axes = new_figure(9, 3.8, 1, 2, sharex=True, sharey=True)
+    quantity, drive = comparison.quantity, comparison.drive
+    signal = comparison.signals.get(drive, np.zeros(comparison.rows))
+    chosen = some_rows(comparison.rows)
+    x = scaled(drive, signal[chosen])
+    for values, style, text in ((comparison.measured, MEASURED, 'measured'),
+                                (comparison.predicted, MODEL, comparison.name)):
+        line = {**style, 'linewidth': 0.9}
+        for trial in np.unique(comparison.trial[chosen]):
+            inside = comparison.trial[chosen] == trial
+            axes[0, 0].plot(x[inside], scaled(quantity, values[chosen][inside]), label=text, **line)
+            text = None
+    axes[0, 0].legend(fontsize=8, ncols=2, frameon=False, loc='lower left', bbox_to_anchor=(0, 1))
+    coloured(figure, axes[0, 1], x, scaled(quantity, comparison.measured[chosen]),
+             comparison.residual[chosen], quantity)
+    axes[0, 1].set_title('measured, by the residual', fontsize=9, loc='left')
+    for axis in axes[0]:
+        axis.set_xlabel(axis_label(drive))
+    axes[0, 0].set_ylabel(axis_label(quantity))
+    return figure
+
+
+def coloured(figure, axis, x, y, residual, quantity):
+    """Scatter points whose lightness is the residual, with its scale beside them."""
+    limit = max(scaled(quantity, float(np.quantile(np.abs(residual), 0.99))), 1e-12)
+    order = np.argsort(np.abs(residual))
+    points = axis.scatter(x[order], y[order], c=scaled(quantity, residual[order]), s=9,
+                          cmap=SIGNED, vmin=-limit, vmax=limit, linewidths=0)
+    bar = figure.colorbar(points, ax=axis)
+    bar.set_label(f'measured - predicted [{label(quantity)[1] or "1"}]', fontsize=8)
+    bar.ax.tick_params(labelsize=8)
+
+
+def load_of(comparison):
+    """Return the name of the load that varies, or None."""
+    return next((name for name in ('force', 'stress') if name in comparison.signals
+                 and name != comparison.drive), None)
+
+
+def residual_on_plane(comparison, drive, load):
+    """
+    Draw the residual over drive and load, the plane in which the muscle works.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    drive, load : str
+        Signals.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    figure, axes = new_figure(6, 3.8)
+    chosen = some_rows(comparison.rows)
+    signals = comparison.signals
+    x = signals.get(drive, np.zeros(comparison.rows))[chosen]
+    coloured(figure, axes[0, 0], scaled(drive, x), scaled(load, signals[load][chosen]),
+             comparison.residual[chosen], comparison.quantity)
+    axes[0, 0].set_xlabel(axis_label(drive))
+    axes[0, 0].set_ylabel(axis_label(load))
+    return figure
+
+
+def residual_since_step(comparison):
+    """
+    Draw the residual against the time since the last step, logarithmic, by direction.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        With the signal `time_since_step`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    figure, axes = new_figure(6, 3.6)
+    axis, quantity = axes[0, 0], comparison.quantity
+    since, residual = comparison.signals['time_since_step'], comparison.residual
+    block = blocks_of(residual, comparison.trial)
+    direction = comparison.signals.get('direction', np.ones(comparison.rows))
+    for way, text, style in ((1.0, 'after a rise', {'color': '#12355b', 'marker': '^'}),
+                             (-1.0, 'after a fall', {'color': '#c9822b', 'marker': 'v',
+                                                     'linestyle': '--'})):
+        inside = (direction == way) & (since > 0)
+        if np.sum(inside) < 10:
+            continue
+        bins = binned('time_since_step', since[inside], residual[inside], block[inside])
+        half = np.where(np.isfinite(bins.half), bins.half, 0.0)
+        axis.errorbar(bins.centre, scaled(quantity, bins.mean), scaled(quantity, half),
+                      label=text, **{**MEANS, **style, 'markersize': 5})
+    axis.set_xscale('log')
+    axis.axhline(0.0, color='black', linewidth=0.8)
+    axis.set_xlabel(axis_label('time_since_step'))
+    axis.set_ylabel(f'measured - predicted [{label(quantity)[1] or "1"}]', fontsize=8)
+    if axis.get_legend_handles_labels()[1]:
+        axis.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def correlogram_of(comparison):
+    """
+    Draw the autocorrelation of the residual with the band that white noise would stay in.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    figure, axes = new_figure(6, 3.2)
+    axis = axes[0, 0]
+    values = correlogram(comparison.residual)
+    lag, name = np.arange(len(values), dtype=float), 'lag [rows]'
+    if comparison.time is not None and comparison.continuous:
+        lag, name = lag * float(np.median(np.diff(comparison.time))), 'lag [s]'
+    axis.plot(*thinned(lag, values), **{**MODEL, 'linestyle': '-'})
+    band = 1.96 / np.sqrt(comparison.rows)
+    axis.axhspan(-band, band, color='#cccccc', alpha=0.8, linewidth=0)
+    axis.axhline(0.0, color='black', linewidth=0.8)
+    axis.set_xlabel(name)
+    axis.set_ylabel('autocorrelation of the residual', fontsize=8)
+    return figure
+
+
+def coverage(comparison):
+    """
+    Draw what the recording covers: where drive and response were, and how long.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    names = [name for name in (comparison.drive, load_of(comparison),
+                               f'{comparison.drive}_rate', 'ambient_temperature')
+             if name in comparison.signals]
+    figure, axes = new_figure(9, 2.6, 1, len(names) + 1, sharey=False)
+    shown = [(name, comparison.signals[name]) for name in names]
+    shown.append((comparison.quantity, comparison.measured))
+    for axis, (name, values) in zip(axes[0], shown):
+        low, high = np.quantile(values, [0.002, 0.998])
+        axis.hist(scaled(name, np.clip(values, low, high)), bins=30, color='#9db7d3',
+                  edgecolor='#12355b', linewidth=0.5)
+        axis.set_xlabel(axis_label(name), fontsize=8)
+    axes[0, 0].set_ylabel('rows', fontsize=8)
+    return figure

@@ -1,0 +1,352 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where a model fails: the residual against every signal, and the worst regions in words.
+
+Residuals of neighbouring rows are alike, so a mean over many rows is not as certain as their
+number suggests. Its interval is therefore taken between blocks of the recording that are longer
+than the residual's memory, not between rows.
+"""
+
+from typing import NamedTuple
+
+from hysteresis_ros.diagnosis.metrics import finite
+from hysteresis_ros.diagnosis.signals import label
+import numpy as np
+from scipy.stats import t as student
+
+MOST_BINS = 12
+FEWEST_ROWS = 4
+FEWEST_BLOCKS = 12
+LEAST_SHARE = 0.02
+MOST_REGIONS = 8
+CONFIDENCE = 0.95
+
+
+class Bins(NamedTuple):
+    """
+    The residual in bins of one signal; all arrays have shape (bins,), units as in the files.
+
+    Attributes
+    ----------
+    signal : str
+    low, high, centre : ndarray
+        Smallest, largest and mean value of the signal in the bin.
+    rows : ndarray of int
+    mean, rmse : ndarray
+        Of the residual.
+    half : ndarray
+        Half width of the 95 % interval of the mean; infinite where one block alone was there.
+
+    """
+
+    signal: str
+    low: np.ndarray
+    high: np.ndarray
+    centre: np.ndarray
+    rows: np.ndarray
+    mean: np.ndarray
+    rmse: np.ndarray
+    half: np.ndarray
+
+    @property
+    def certain(self):
+        """Whether the mean differs from 0, ndarray of bool (bins,)."""
+        return np.abs(self.mean) > self.half
+
+
+class Region(NamedTuple):
+    """
+    A part of a signal's range in which the model fails.
+
+    Attributes
+    ----------
+    signal : str
+    low, high : float
+        The part, in the unit of files.
+    mean_residual : float
+        Mean of measured less predicted.
+    rmse : float
+    rows : int
+    share : float
+        Of the squared error of all rows that this region's rows make up.
+    text : str
+        The same in words.
+
+    """
+
+    signal: str
+    low: float
+    high: float
+    mean_residual: float
+    rmse: float
+    rows: int
+    share: float
+    text: str
+
+    def to_json(self):
+        """Return the entry of `where` in the JSON of compare."""
+        return {'signal': self.signal, 'from': finite(self.low), 'to': finite(self.high),
+                'mean_residual': finite(self.mean_residual), 'rmse': finite(self.rmse),
+                'rows': int(self.rows), 'share': finite(self.share), 'text': self.text}
+
+
+def blocks_of(residual, trial):
+    """
+    Divide the rows into blocks that are longer than the memory of the residual.
+
+    Parameters
+    ----------
+    residual : ndarray, (rows,)
+    trial : ndarray of int (rows,)
+        Counts from 0; a block never spans two trials.
+
+    Returns
+    -------
+    ndarray of int (rows,)
+        Block of each row, from 0.
+
+    """
+    length = max(1, int(np.ceil(2.0 * memory(residual))))
+    length = max(1, min(length, len(residual) // FEWEST_BLOCKS))
+    starts = np.flatnonzero(np.concatenate(([True], np.diff(trial) != 0)))
+    inside = np.arange(len(trial)) - starts[trial]
+    number = inside // length
+    fresh = np.concatenate(([True], (np.diff(number) != 0) | (np.diff(trial) != 0)))
+    return np.cumsum(fresh) - 1
+
+
+def memory(residual):
+    """
+    Return after how many rows the residual has forgotten itself.
+
+    Parameters
+    ----------
+    residual : ndarray, (rows,)
+
+    Returns
+    -------
+    float
+        1 + 2 sum of the autocorrelations up to the first one below 0.05.
+
+    """
+    correlation = correlogram(residual)[1:]
+    below = np.flatnonzero(correlation < 0.05)
+    end = below[0] if below.size else len(correlation)
+    return float(1.0 + 2.0 * np.sum(correlation[:end]))
+
+
+def correlogram(residual, most=None):
+    """
+    Return the autocorrelation of a residual.
+
+    Parameters
+    ----------
+    residual : ndarray, (rows,)
+    most : int, optional
+        Largest lag in rows; a quarter of the rows by default.
+
+    Returns
+    -------
+    ndarray of float64 (lags + 1,)
+        1 at lag 0; 0 everywhere else for a residual that does not vary.
+
+    """
+    rows = len(residual)
+    most = min(rows - 1, rows // 4 if most is None else most)
+    centred = residual - np.mean(residual)
+    spectrum = np.fft.rfft(centred, 1 << int(2 * rows - 1).bit_length())
+    covariance = np.fft.irfft(spectrum * np.conj(spectrum))[:most + 1]
+    if covariance[0] <= 1e-30:
+        return np.concatenate(([1.0], np.zeros(most)))
+    return covariance / covariance[0]
+
+
+def binned(signal, values, residual, block):
+    """
+    Average a residual in bins of a signal.
+
+    Parameters
+    ----------
+    signal : str
+    values, residual : ndarray, (rows,)
+    block : ndarray of int (rows,)
+        As `blocks_of` gives them.
+
+    Returns
+    -------
+    Bins
+        As many rows in each as the values allow; one value a bin if there are few values.
+
+    """
+    index = bin_index(values)
+    rows = np.bincount(index)
+    mean = np.bincount(index, residual) / rows
+    rmse = np.sqrt(np.bincount(index, residual ** 2) / rows)
+    order = np.argsort(index, kind='stable')
+    starts = np.concatenate(([0], np.cumsum(rows)[:-1]))
+    low = np.minimum.reduceat(values[order], starts)
+    high = np.maximum.reduceat(values[order], starts)
+    centre = np.bincount(index, values) / rows
+    half = half_width(residual - mean[index], index, block, rows)
+    return Bins(signal, low, high, centre, rows, mean, rmse, half)
+
+
+def bin_index(values):
+    """Return the bin of each row, from 0 without gaps, ascending with the value."""
+    unique, inverse = np.unique(values, return_inverse=True)
+    if len(unique) <= MOST_BINS:
+        return inverse
+    bins = int(np.clip(len(values) // FEWEST_ROWS, 1, MOST_BINS))
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, bins + 1)[1:-1]))
+    index = np.searchsorted(edges, values, side='right')
+    return np.unique(index, return_inverse=True)[1]
+
+
+def half_width(deviation, index, block, rows):
+    """Return the half widths of the intervals of the means, between blocks, (bins,)."""
+    bins, blocks = len(rows), int(block.max()) + 1
+    cell = index * blocks + block
+    sums = np.bincount(cell, deviation, bins * blocks).reshape(bins, blocks)
+    visited = np.bincount(cell, minlength=bins * blocks).reshape(bins, blocks) > 0
+    count = visited.sum(axis=1)
+    half = np.full(bins, np.inf)
+    many = count > 1
+    correction = count[many] / (count[many] - 1.0)
+    error = np.sqrt(correction * np.sum(sums[many] ** 2, axis=1)) / rows[many]
+    half[many] = student.ppf(0.5 + CONFIDENCE / 2, count[many] - 1) * error
+    return half
+
+
+def regions(signals, residual, block, quantity):
+    """
+    Name the worst regions, worst first.
+
+    Parameters
+    ----------
+    signals : dict of str to ndarray (rows,)
+    residual : ndarray, (rows,)
+    block : ndarray of int (rows,)
+    quantity : str
+        The response, for units.
+
+    Returns
+    -------
+    list of Region
+        At most one a signal. Empty if the residual is the same everywhere; a residual that is
+        off everywhere by much the same is one region over the whole range of the first signal.
+
+    """
+    total = float(np.sum(residual ** 2))
+    if total <= 0:
+        return []
+    scored = []
+    for name, values in signals.items():
+        bins = binned(name, values, residual, block)
+        best = worst_run(bins, float(np.mean(residual)))
+        if best is not None and best[0] > LEAST_SHARE * total:
+            score, first, last = best
+            inside = (values >= bins.low[first]) & (values <= bins.high[last])
+            scored.append((score, region(name, bins.low[first], bins.high[last],
+                                         residual[inside], total, len(residual), quantity,
+                                         both=bool(abs(np.mean(residual[inside]))
+                                                   < 0.5 * np.std(residual[inside])))))
+    scored.sort(key=lambda item: -item[0])
+    found = [item for _, item in scored[:MOST_REGIONS]]
+    overall = offset_everywhere(signals, residual, block, quantity, total)
+    return ([overall] if overall else []) + found
+
+
+def worst_run(bins, overall):
+    """
+    Find the neighbouring bins that fail most.
+
+    Parameters
+    ----------
+    bins : Bins
+    overall : float
+        Mean of all rows: what is off everywhere says nothing about where.
+
+    Returns
+    -------
+    tuple of (float, int, int) or None
+        Squared error that the run has above the overall mean, first and last bin.
+
+    """
+    sign = np.where(bins.certain, np.sign(bins.mean), 0.0)
+    beyond = np.where(sign == np.sign(overall), np.abs(bins.mean) - abs(overall),
+                      np.abs(bins.mean))
+    systematic = bins.rows * np.where(sign != 0, np.maximum(beyond, 0.0), 0.0) ** 2
+    typical = float(np.sum(bins.rows * bins.rmse ** 2) / np.sum(bins.rows))
+    scatter = bins.rows * np.maximum(bins.rmse ** 2 - 2.0 * typical, 0.0)
+    best = None
+    for score, kind in ((systematic, sign), (scatter, np.sign(scatter))):
+        first = 0
+        while first < len(score):
+            last = first
+            while (last + 1 < len(score) and score[first] > 0 and score[last + 1] > 0
+                   and kind[last + 1] == kind[first]):
+                last += 1
+            found = float(np.sum(score[first:last + 1]))
+            if found > 0 and (best is None or found > best[0]):
+                best = found, first, last
+            first = last + 1
+    return best
+
+
+def offset_everywhere(signals, residual, block, quantity, total):
+    """Return the region over everything, if most of the error is one constant, else None."""
+    mean = float(np.mean(residual))
+    half = half_width(residual - mean, np.zeros(len(residual), dtype=int), block,
+                      np.array([len(residual)]))[0]
+    if len(residual) * mean ** 2 < 0.5 * total or abs(mean) <= half:
+        return None
+    name, values = next(iter(signals.items()))
+    return region(name, values.min(), values.max(), residual, total, len(residual), quantity,
+                  whole=True)
+
+
+def region(name, low, high, residual, total, rows, quantity, both=False,
+           whole=False):
+    """Build a region from its rows' residual, with its sentence."""
+    mean, rmse = float(np.mean(residual)), float(np.sqrt(np.mean(residual ** 2)))
+    share = float(np.sum(residual ** 2)) / total
+    _, unit, scale = label(quantity)
+    what = 'longer' if quantity in ('length', 'strain') else 'larger'
+    less = 'shorter' if quantity in ('length', 'strain') else 'smaller'
+    if both:
+        error = f'the error is {number(scale * rmse)} {unit} RMS, of both signs,'
+    else:
+        error = (f'the measured {quantity} is {number(abs(scale * mean))} {unit} '
+                 f'{what if mean > 0 else less} than predicted')
+    place = 'everywhere' if whole else placed(name, low, high)
+    text = (f'{error} {place}' + ('' if whole else f': {100 * share:.0f} % of the squared error '
+            f'in {100 * len(residual) / rows:.0f} % of the rows'))
+    return Region(name, float(low), float(high), mean, rmse, len(residual), share, text)
+
+
+def placed(name, low, high):
+    """Say in words which part of a signal's range is meant."""
+    text, unit, scale = label(name)
+    if name == 'direction':
+        words = {-1.0: 'while the drive falls', 0.0: 'before the drive first moves',
+                 1.0: 'while the drive rises'}
+        return ' and '.join(words[way] for way in (-1.0, 0.0, 1.0) if low <= way <= high)
+    if name in ('trial', 'trial_number'):
+        after = '' if name == 'trial' else ' of all recordings (counted from 0)'
+        return (f'in trial {low:g}' if low == high else f'in trials {low:g} to {high:g}') + after
+    unit = f' {unit}' if unit else ''
+    if low == high:
+        return f'where {text} is {number(scale * low)}{unit}'
+    return f'where {text} is {number(scale * low)} to {number(scale * high)}{unit}'
+
+
+def number(value):
+    """Return a number as a person would write it: three digits, no exponent where avoidable."""
+    if value == 0 or not np.isfinite(value):
+        return f'{value:g}'
+    digits = 2 - int(np.floor(np.log10(abs(value))))
+    if digits > 6 or digits < -9:
+        return f'{value:.3g}'
+    rounded = round(value, digits)
+    return f'{rounded:.{max(digits, 0)}f}'
