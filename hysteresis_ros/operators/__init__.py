@@ -3,7 +3,7 @@
 """Hysteresis operators, their exact inverses, and the models that couple them."""
 
 from .additive import Additive
-from .areas import signed_areas
+from .areas import signed_areas, signed_lengths
 from .base import HysteresisOperator, Inversion, operator_from_dict
 from .bouc_wen import BoucWen
 from .branch import Branch, PiecewiseQuadratic
@@ -33,4 +33,5 @@ __all__ = [
     'linear_model',
     'operator_from_dict',
     'signed_areas',
+    'signed_lengths',
 ]

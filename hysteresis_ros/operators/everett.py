@@ -16,8 +16,8 @@ diagonal cells beside it, and A, C the weight along the row and along the column
 In a diagonal cell it is w (alpha - beta)^2 / 2. All terms are non-negative: nothing cancels.
 
 A weight can also lie on the diagonal beta = alpha itself, g per unit of its length: relays without
-a loop, the limit of ever smaller diagonal cells. It adds g (alpha - beta) in a diagonal cell, g_a to
-A and g_b to C.
+a loop, the limit of ever smaller diagonal cells. It adds g (alpha - beta) in a diagonal cell, g_a
+to A and g_b to C.
 """
 
 from bisect import bisect_right
@@ -96,8 +96,8 @@ class Everett:
         Checked grid nodes.
     weights : ndarray, shape (N (N + 1) / 2,)
         Non-negative weights in the order of Eq. 8.
-    slopes : ndarray, shape (N,)
-        Non-negative weights on the diagonal itself, one an interval.
+    slopes : ndarray, shape (N,), optional
+        Non-negative weights on the diagonal itself, one an interval; default 0.
 
     Attributes
     ----------
@@ -106,7 +106,8 @@ class Everett:
 
     """
 
-    def __init__(self, nodes: np.ndarray, weights: np.ndarray, slopes: np.ndarray) -> None:
+    def __init__(self, nodes: np.ndarray, weights: np.ndarray,
+                 slopes: np.ndarray | None = None) -> None:
         levels = len(nodes) - 1
         width = np.diff(nodes)
         beta, alpha = cells(levels)
@@ -126,6 +127,7 @@ class Everett:
         column[:, 1:] = np.cumsum(np.triu(density * width[None, :], 1), axis=1)
         half = np.diag(density) / 2.0
 
+        slopes = np.zeros(levels) if slopes is None else slopes
         along = np.concatenate(([0.0], np.cumsum(slopes * width)))
         corner += np.triu(along[None, :] - along[:, None])
         row += slopes[None, :]

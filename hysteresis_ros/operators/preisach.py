@@ -46,8 +46,8 @@ class Preisach(HysteresisOperator):
     bias : float
         The constant c of Eqs. 3 and 6.
     reversible : array_like, shape (N,), optional
-        Weights on the line beta = alpha, one an interval, of the same sign. Half the slope that
-        every branch has there at least: unit of the output over the unit of the input.
+        Weights on the line beta = alpha, one an interval, of the same sign; every branch has at
+        least twice this slope there. Unit of the output over the unit of the input. Default 0.
 
     Raises
     ------
@@ -381,7 +381,7 @@ class Preisach(HysteresisOperator):
         """Build the operator from what `to_dict` returned; ParameterError if it cannot be."""
         where = 'Preisach operator'
         return cls(take(parameters, 'nodes', where), take(parameters, 'weights', where),
-                   take(parameters, 'bias', where), take(parameters, 'reversible', where))
+                   take(parameters, 'bias', where), parameters.get('reversible'))
 
 
 def _check_weights(weights: np.ndarray, levels: int) -> np.ndarray:
