@@ -25,6 +25,7 @@ LENGTH_TOLERANCE = 1e-7
 MOMENT_TOLERANCE = 2e-6
 # Steps in time [s] where the temperature feeds back on itself, and where the arm has inertia.
 COUPLED_STEP = 0.5
+SETTLING_STEP = 1.0
 INERTIAL_STEP = 0.02
 # Damping of the wires' own, over the critical one, where nothing else damps the arm.
 INNER_DAMPING = 0.03
@@ -63,7 +64,7 @@ class Arm:
         self.tensions = [5.0] * len(self.muscle.wires)
         coupled = (conditions.heat.latent or conditions.resistance_growth or conditions.viscous
                    or conditions.disturbances or conditions.creep)
-        self._settling_step = COUPLED_STEP if coupled else math.inf
+        self._settling_step = SETTLING_STEP if coupled else math.inf
         self.heat_and_cool()
 
     def heat_and_cool(self) -> None:

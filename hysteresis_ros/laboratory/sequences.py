@@ -8,7 +8,8 @@ HIGHEST = 6.0
 # Between these voltages the arm moves [V].
 LOW, HIGH = 2.4, 5.6
 # Swings of the damped oscillation: where each ends [V], and in how many steps.
-SWINGS = ((6.0, 8), (0.0, 7), (5.25, 6), (0.75, 5), (4.5, 4), (1.5, 3), (3.75, 2), (3.0, 1))
+SWINGS = ((6.0, 5), (0.0, 5), (5.25, 5), (0.75, 5), (4.5, 4), (1.5, 4), (4.0, 3), (2.0, 2),
+          (3.5, 2), (3.0, 1))
 SAMPLING = 0.1
 
 

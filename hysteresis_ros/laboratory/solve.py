@@ -4,7 +4,7 @@
 
 from collections.abc import Callable
 
-ITERATIONS = 80
+ITERATIONS = 120
 
 
 def increasing_root(function: Callable[[float], float], guess: float, slope: float, lower: float,
@@ -12,8 +12,9 @@ def increasing_root(function: Callable[[float], float], guess: float, slope: flo
     """
     Return the argument in [lower, upper] at which an increasing function vanishes.
 
-    Secant steps from `guess`, kept inside the bracket that the signs seen so far give; the nearer
-    bound where the function has no root between them.
+    Secant steps from `guess` inside the bracket that the signs seen so far give; a step that does
+    not halve the value seen before is followed by one to the middle, or outwards while there is
+    only one sign. Where the function has no root between them, the nearer bound.
 
     Parameters
     ----------
@@ -27,29 +28,42 @@ def increasing_root(function: Callable[[float], float], guess: float, slope: flo
         Absolute value below which the function counts as zero.
     """
     low, high = lower, upper
+    seen_low = seen_high = False
     point = min(max(guess, lower), upper)
     value = function(point)
+    stride = 1.0
     for _ in range(ITERATIONS):
         if abs(value) <= tolerance:
             return point
         if value > 0.0:
-            high = point
+            high, seen_high = point, True
         else:
-            low = point
-        if high - low <= 1e-12 * (1.0 + abs(high)):
+            low, seen_low = point, True
+        if high - low <= 1e-13 * (1.0 + abs(high)):
             return point
-        following = point - value / slope
+        following = point - stride * value / slope
         if not low < following < high:
-            # Outside: the bound itself if it was not tried yet, else the middle.
-            edge = lower if value > 0.0 else upper
-            tried = low if value > 0.0 else high
-            if tried == edge and (following - edge) * value <= 0.0 and point != edge:
-                following = edge
+            if value > 0.0:
+                following = 0.5 * (low + high) if seen_low else lower
             else:
-                following = 0.5 * (low + high)
+                following = 0.5 * (low + high) if seen_high else upper
         change = function(following)
-        if following != point and change != value:
-            estimate = (change - value) / (following - point)
-            slope = estimate if estimate > 0.0 else slope
+        estimate = (change - value) / (following - point)
+        if estimate > 0.0:
+            slope = estimate
+        if abs(change) > 0.5 * abs(value):
+            # Slow: leap further while the root is not enclosed, else halve the bracket.
+            stride *= 3.0
+            if seen_low and seen_high and abs(change) > tolerance:
+                point, value = following, change
+                if value > 0.0:
+                    high = point
+                else:
+                    low = point
+                following = 0.5 * (low + high)
+                change = function(following)
+                stride = 1.0
+        else:
+            stride = 1.0
         point, value = following, change
     return point
