@@ -203,14 +203,15 @@ def test_telemetry_round_trip(telemetry):
 
 
 def test_identity_round_trip():
-    identity = Identity(1, 'bicep', '1.0', 4_000_000_000, 16, 60.0)
+    identity = Identity(1, 'bicep', '1.0', 7, 4_000_000_000, 16, 60.0)
     frame, = decode(encode('board', 3, identity.fields()))
     assert Identity.from_frame(frame) == identity
 
 
 @pytest.mark.parametrize('fields', [
-    {'protocol': 1, 'time': 0, 'bits': 8}, {'protocol': 1, 'time': 0, 'speed': 0},
-    {'protocol': 1}, {'time': 0}])
+    {'protocol': 1, 'boot': 1, 'time': 0, 'bits': 8},
+    {'protocol': 1, 'boot': 1, 'time': 0, 'speed': 0},
+    {'protocol': 1, 'boot': 1}, {'protocol': 1, 'time': 0}, {'boot': 1, 'time': 0}])
 def test_identities_that_make_no_sense(fields):
     with pytest.raises(ProtocolError):
         Identity.from_frame(decode(encode('board', 1, fields))[0])

@@ -46,6 +46,8 @@ class Identity(NamedTuple):
         Version of the protocol that it speaks.
     name, firmware : str
         What it is.
+    boot : int
+        A number that is another one each time the board starts.
     time : int
         Its clock, ms since it started, modulo 2**32.
     counter_bits : int
@@ -58,6 +60,7 @@ class Identity(NamedTuple):
     protocol: int
     name: str
     firmware: str
+    boot: int
     time: int
     counter_bits: int
     speed: float
@@ -96,7 +99,8 @@ class Identity(NamedTuple):
 
         """
         identity = cls(integer(frame, 'protocol'), frame.fields.get('name', 'unnamed'),
-                       frame.fields.get('firmware', 'unknown'), integer(frame, 'time'),
+                       frame.fields.get('firmware', 'unknown'), integer(frame, 'boot'),
+                       integer(frame, 'time'),
                        integer(frame, 'bits', 32), decimal(frame, 'speed', 1.0))
         if identity.counter_bits not in (16, 32) or identity.speed <= 0:
             raise ProtocolError('the board says that its counter has '
@@ -188,9 +192,12 @@ class Telemetry(NamedTuple):
         """
         faults = frame.fields.get('faults', NO_FAULTS)
         has = frame.fields.__contains__
+        supply, duty = decimal(frame, 'supply'), decimal(frame, 'duty')
+        if supply < 0.0 or not 0.0 <= duty <= 1.0:
+            raise ProtocolError(f'the board says that its supply is {supply:g} V and its duty '
+                                f'{duty:g}: no board can')
         return cls(
-            time=integer(frame, 'time'), counts=integer(frame, 'counts'),
-            supply=decimal(frame, 'supply'), duty=decimal(frame, 'duty'),
+            time=integer(frame, 'time'), counts=integer(frame, 'counts'), supply=supply, duty=duty,
             enabled=integer(frame, 'on') != 0,
             faults=() if faults == NO_FAULTS else tuple(faults.split(',')),
             index=integer(frame, 'index', 0),

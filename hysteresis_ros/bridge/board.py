@@ -1,0 +1,436 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The host's side of the board: volts in, angles out, whatever happens to the cable.
+
+`Board` keeps two threads. One opens the port, greets the board, reads telemetry, and starts over
+when the board is lost; the other writes setpoints, the latest one only, and repeats it so that the
+board's watchdog knows that the host lives. Nobody who calls `Board` ever waits for the port.
+
+Two watchdogs cut the muscle off. The host's: no `Board.set_voltage` within ``timeouts.setpoint``,
+and 0 is sent. The board's: no setpoint within ``timeouts.watchdog``, and it stops on its own.
+"""
+
+import threading
+import time
+from typing import NamedTuple
+
+from hysteresis_ros.bridge.board_clock import BoardClock
+from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
+from hysteresis_ros.bridge.encoder import Encoder
+from hysteresis_ros.bridge.messages import (
+    DISABLE, ENABLE, FAULTS, Identity, NO, SET, Telemetry, TELEMETRY)
+from hysteresis_ros.bridge.pwm import Pwm
+from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError
+
+SUPPLY_SMOOTHING = 0.1      # share of a new measurement of the supply
+SUPPLY_STEP = 0.03          # relative change that is taken at once
+STOP_PATIENCE = 0.5         # s to wait on the way out until the board says that it is off
+
+
+class Sample(NamedTuple):
+    """
+    One frame of telemetry in SI units.
+
+    Attributes
+    ----------
+    time : float
+        Board time in s since the first contact; it only grows, also over restarts.
+    angle, velocity : float
+        In rad and rad/s.
+    fresh : bool
+        Whether the encoder's sample was believed; if not, `angle` is the one before.
+    voltage : float
+        Voltage in V that the board applies, as its duty and supply say.
+    supply : float
+        Smoothed supply voltage in V.
+    ambient : float or None
+        Ambient temperature in degC, in the frames that carry it.
+    enabled : bool
+        Whether the board takes setpoints.
+    faults : tuple of str
+        The board's faults, see `messages.FAULTS`.
+    encoder_fault : str
+        What is wrong with the angle, or ''.
+
+    """
+
+    time: float
+    angle: float
+    velocity: float
+    fresh: bool
+    voltage: float
+    supply: float
+    ambient: 'float | None'
+    enabled: bool
+    faults: tuple
+    encoder_fault: str
+
+
+class Status(NamedTuple):
+    """
+    How things are.
+
+    Attributes
+    ----------
+    online : bool
+        Whether telemetry comes.
+    problem : str
+        Why not, or '' while nobody has tried yet.
+    faults : str
+        The board's faults in words, or ''.
+    limit : str
+        Why the output is less than asked for, or ''.
+    expired : bool
+        Whether the setpoint is too old, so that 0 is sent.
+    refusal : str
+        The board's latest refusal, or ''.
+    sample : Sample or None
+        The latest one.
+    identity : Identity or None
+        The board's latest greeting.
+    frames, bad_lines, lost_frames, connections : int
+        Counters since the start.
+    last_bad_line : str
+        The latest bad line and what was wrong with it, or ''.
+
+    """
+
+    online: bool
+    problem: str
+    faults: str
+    limit: str
+    expired: bool
+    refusal: str
+    sample: 'Sample | None'
+    identity: 'Identity | None'
+    frames: int
+    bad_lines: int
+    lost_frames: int
+    connections: int
+    last_bad_line: str
+
+
+class Board:
+    """
+    A PWM board with an encoder, on any port.
+
+    Parameters
+    ----------
+    port : str
+        Device or pyserial URL, such as ``/dev/ttyUSB0`` or ``sim://bicep``.
+    baud : int
+        Bits per second.
+    pwm : Pwm
+        Law and limits between voltage and duty.
+    encoder : Encoder
+        From counts to angle.
+    timeouts : Timeouts
+        Time limits.
+    telemetry_period : float
+        Time in s of the board's clock between two samples.
+    supply : float
+        Nominal supply voltage in V.
+    supply_tolerance : float
+        Share by which the measured supply may differ from it; beyond, the output is off, because
+        a wrong measurement would burn the muscle.
+    on_sample : callable, optional
+        Called with each `Sample`, in the reading thread.
+
+    Attributes
+    ----------
+    pwm : Pwm
+        May be replaced at any time.
+
+    Raises
+    ------
+    ParameterError
+        If no port can have this name, or another value makes no sense.
+
+    Examples
+    --------
+    What goes wrong shows in `status`, never as an exception of the threads:
+
+    * the port does not exist: ``problem`` says so, and opening is tried again for ever;
+    * the board falls silent or is unplugged: likewise, after ``timeouts.telemetry``; the output
+      stays at zero after that until a new setpoint comes;
+    * the board starts anew: it is greeted and enabled again, the encoder's doubt is in the samples;
+    * the supply is off or weak: ``limit`` says what the muscle gets instead.
+
+    """
+
+    def __init__(self, port, baud=115200, pwm=Pwm(), encoder=None, timeouts=Timeouts(),
+                 telemetry_period=0.1, supply=12.0, supply_tolerance=0.25,
+                 on_sample=lambda sample: None):
+        self.pwm = pwm
+        self._encoder = encoder or Encoder()
+        self._timeouts = timeouts
+        self._period = telemetry_period
+        self._nominal_supply = supply
+        self._supply_tolerance = supply_tolerance
+        self._on_sample = on_sample
+        self._link = BoardLink(port, baud, timeouts)
+        self._clock = BoardClock()
+        self._wake = threading.Condition()
+        self._stopping = threading.Event()
+        self._news = False          # something for the writer
+        self._wanted = False        # whether the board shall be enabled
+        self._target = None         # (voltage, wall time at which it was set)
+        self._online = False
+        self._problem = ''
+        self._write_problem = None
+        self._supply = None
+        self._identity = None
+        self._sample = None
+        self._received = 0.0        # wall time of the latest sample
+        self._limit = ''
+        self._refusal = ''
+        self._connections = 0
+        self._threads = [threading.Thread(target=target, name=name, daemon=True)
+                         for target, name in ((self._run, 'board reader'),
+                                              (self._write, 'board writer'))]
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *error):
+        self.stop()
+
+    def start(self):
+        """Begin to look for the board. Returns at once."""
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self):
+        """Switch the output off, wait a moment until the board says so, and close the port."""
+        with self._wake:
+            self._wanted = False
+            self._target = None
+        self._say_zero()
+        deadline = time.monotonic() + STOP_PATIENCE
+        with self._wake:
+            while self._online and self._sample.enabled and time.monotonic() < deadline:
+                self._wake.wait(deadline - time.monotonic())
+            self._stopping.set()
+            self._wake.notify_all()
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join(2.0)
+        self._link.close()
+
+    def set_voltage(self, voltage):
+        """
+        Ask for a voltage. Never waits.
+
+        Parameters
+        ----------
+        voltage : float
+            Voltage in V; it has to be repeated within ``timeouts.setpoint``.
+
+        Raises
+        ------
+        RangeError
+            If it is not finite or outside the limits; the setpoint before stays.
+
+        """
+        self.pwm.check(voltage)
+        with self._wake:
+            self._target = (voltage, time.monotonic())
+            self._tell_writer()
+
+    def rest(self):
+        """Ask for zero until the next `set_voltage`. Never waits."""
+        with self._wake:
+            self._target = None
+            self._tell_writer()
+
+    def enable(self, wanted):
+        """
+        Let the board take setpoints, or switch its output off. Never waits.
+
+        Parameters
+        ----------
+        wanted : bool
+            What shall be; `Sample.enabled` says what is. After enabling, the output is zero until
+            a new setpoint comes.
+
+        """
+        with self._wake:
+            self._wanted = wanted
+            self._target = None
+            self._tell_writer()
+
+    def forgive(self):
+        """Drop the doubt about the encoder's angle, because somebody has checked it."""
+        self._encoder.forgive()
+
+    @property
+    def slowness(self):
+        """How many seconds of the wall a second of the slower clock takes, at least 1."""
+        return 1.0 / min(self.speed, 1.0)
+
+    @property
+    def speed(self):
+        """How fast the board's clock runs against the wall's; 1 before the first greeting."""
+        return self._identity.speed if self._identity else 1.0
+
+    @property
+    def status(self):
+        """How things are, as a `Status`."""
+        with self._wake:
+            sample = self._sample
+            bad = self._link.decoder.last_bad
+            return Status(
+                self._online, self._problem,
+                '; '.join(f'{name}: {FAULTS.get(name, "see the board")}'
+                          for name in sample.faults) if sample else '',
+                self._limit, self._target is not None and self._expired(), self._refusal, sample,
+                self._identity, self._link.decoder.frames, self._link.decoder.bad_lines,
+                self._link.lost_frames, self._connections,
+                f'"{bad.text}": {bad.reason}' if bad else '')
+
+    def _tell_writer(self):
+        self._news = True
+        self._wake.notify_all()
+
+    def _expired(self):
+        age = time.monotonic() - self._target[1]
+        return age > self._timeouts.setpoint * self.slowness
+
+    # The reading thread
+
+    def _run(self):
+        delay = self._timeouts.first_retry
+        while not self._stopping.is_set():
+            connections = self._connections
+            try:
+                self._link.open()
+                while not self._stopping.is_set():
+                    self._greet()
+                    self._listen()
+            except HysteresisError as error:
+                self._lose(str(error))
+            except Exception as error:     # whatever it is: the muscle off, and on with the loop
+                self._lose(f'port {self._link.port}: unexpected {error!r}')
+            self._link.close()
+            if self._connections > connections:
+                delay = self._timeouts.first_retry
+            self._stopping.wait(delay)
+            delay = min(2.0 * delay, self._timeouts.last_retry)
+
+    def _greet(self):
+        identity = self._link.greet(self._period, self._timeouts.watchdog, self._stopping)
+        with self._wake:
+            if self._identity is None:
+                self._encoder.counter_bits = identity.counter_bits
+                self._clock.begin(identity.time)
+            elif identity.boot != self._identity.boot or self._clock.back(identity.time):
+                self._encoder.restart()
+                self._clock.begin(
+                    identity.time, (time.monotonic() - self._received) * identity.speed)
+            self._identity = identity
+            self._received = time.monotonic()
+            self._write_problem = None
+            self._supply = None
+            self._connections += 1
+
+    def _listen(self):
+        """Read telemetry until the board starts anew; raise when it is lost."""
+        patience = self._timeouts.telemetry * self.slowness
+        while not self._stopping.is_set():
+            for frame in self._link.read():
+                if frame.kind == NO:
+                    self._refusal = frame.fields.get('reason', 'no reason')
+                if frame.kind != TELEMETRY:
+                    continue
+                telemetry = Telemetry.from_frame(frame)
+                if self._clock.back(telemetry.time):
+                    self._lose(f'port {self._link.port}: the board has started anew')
+                    return
+                self._take(telemetry)
+            if self._write_problem is not None:
+                raise self._write_problem
+            if time.monotonic() - self._received > patience:
+                raise BoardError(f'port {self._link.port}: the board is silent, no telemetry for '
+                                 f'{patience:.3g} s; the output is off')
+
+    def _take(self, telemetry):
+        reading = self._encoder.update(self._clock.follow(telemetry.time), telemetry.counts,
+                                       telemetry.index, telemetry.latch)
+        self._smooth(telemetry.supply)
+        sample = Sample(
+            self._clock.time, reading.angle, reading.velocity, reading.fresh,
+            self.pwm.voltage(telemetry.duty, self._supply), self._supply, telemetry.ambient,
+            telemetry.enabled, telemetry.faults, reading.fault)
+        with self._wake:
+            if not self._online or sample.enabled != self._sample.enabled:
+                self._tell_writer()
+            self._online = True
+            self._problem = ''
+            self._sample = sample
+            self._received = time.monotonic()
+        self._on_sample(sample)
+
+    def _smooth(self, supply):
+        before = self._supply
+        if before is None or abs(supply - before) > SUPPLY_STEP * self._nominal_supply:
+            self._supply = supply
+        else:
+            self._supply = before + SUPPLY_SMOOTHING * (supply - before)
+
+    def _lose(self, problem):
+        with self._wake:
+            self._online = False
+            self._problem = problem
+            self._target = None
+            self._limit = ''
+        self._say_zero()
+
+    # The writing thread
+
+    def _write(self):
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._news or self._stopping.is_set(),
+                                    self._timeouts.keepalive)
+                self._news = False
+                if self._stopping.is_set():
+                    return
+                command = self._command() if self._online else None
+            if command is None:
+                continue
+            try:
+                self._link.send(*command)
+            except (BoardError, ProtocolError) as error:
+                self._write_problem = error
+
+    def _command(self):
+        """Return what the board has to hear now: (kind, fields), or None."""
+        if self._wanted != self._sample.enabled:
+            return (ENABLE if self._wanted else DISABLE, None)
+        if not self._wanted:
+            return None
+        return (SET, {'duty': self._duty()})
+
+    def _duty(self):
+        self._limit = ''
+        if self._target is None or self._expired():
+            return 0.0
+        off = abs(self._supply - self._nominal_supply)
+        if off > self._supply_tolerance * self._nominal_supply:
+            self._limit = (
+                f'the supply measures {self._supply:.3g} V, {self._nominal_supply:g} V expected: '
+                'output off; check the supply and the parameter supply_voltage')
+            return 0.0
+        drive = self.pwm.drive(self._target[0], self._supply)
+        self._limit = drive.limit
+        return drive.duty
+
+    def _say_zero(self):
+        """Tell the board to stop, as far as it can still hear."""
+        try:
+            self._link.send(SET, {'duty': 0.0})
+            self._link.send(DISABLE)
+        except BoardError:
+            pass    # the board's own watchdog does it

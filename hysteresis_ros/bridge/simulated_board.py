@@ -1,0 +1,275 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The board's side of the protocol, on an arm that exists only in the virtual laboratory.
+
+This is what a microcontroller's program has to do, written in Python: `docs/protocol.md` refers to
+it as the reference. Bytes go in by `receive` and come out by `transmit`; time passes by `advance`
+and by nothing else, in whole ticks, so that the same bytes at the same ticks always give the same
+answer.
+"""
+
+import math
+import random
+
+from hysteresis_ros.bridge.messages import (
+    BOARD, CONFIG, DISABLE, ENABLE, HELLO, Identity, NO, OK, SET, Telemetry, TELEMETRY, TIME_LIMIT,
+    ZERO)
+from hysteresis_ros.bridge.protocol import (
+    BadLine, decimal, Decoder, encode, Frame, integer, SEQUENCE_LIMIT, VERSION)
+from hysteresis_ros.errors import ProtocolError
+
+TICK = 20                   # ms; the arm is advanced in these steps
+PERIOD = 100                # ms between two frames of telemetry, until `config` says otherwise
+WATCHDOG = 1000             # ms without a setpoint that switch the output off, likewise
+AMBIENT_PERIOD = 1000       # ms between two measurements of the ambient temperature
+REMARK_PERIOD = 200         # ms between two explanations for people
+LOWEST_SUPPLY = 4.0         # V below which the output is off
+PWM_STEPS = 65535
+INDEX_COUNTS = 2731         # the index pulse: at 120 degrees, within the range of the arm
+COUNTS_PER_REVOLUTION = 8192
+SUPPLY_NOISE = 0.01         # V, standard deviation of the supply's measurement
+
+BROWNOUT_TIME = 300         # ms that a brownout takes; then the board starts anew
+BROWNOUT_SUPPLY = 0.2       # what it leaves of the supply
+
+
+class SimulatedBoard:
+    """
+    Firmware, output stage and encoder counter of a board with an arm on it.
+
+    Parameters
+    ----------
+    arm : object
+        The physics: ``advance(dt, voltage)`` with dt in s and the heating (RMS) voltage in V;
+        attributes ``encoder_counts`` and ``ambient_temperature`` in degC.
+    supply : float
+        Supply voltage in V.
+    seed : int
+        Of the noise of the supply's measurement.
+    speed : float
+        How much faster than the wall's clock somebody lets time pass here; only told to the host.
+    brownout : float, optional
+        Time in s at which the supply breaks down for a moment and the board starts anew.
+
+    Attributes
+    ----------
+    arm : object
+        The arm.
+    duty, enabled, faults
+        As in the telemetry.
+    time : int
+        The board's clock in ms since it last started, not wrapped.
+    next_telemetry : int
+        When, by that clock, the next telemetry is sent.
+
+    """
+
+    def __init__(self, arm, supply=12.0, seed=0, speed=1.0, brownout=math.inf):
+        self.arm = arm
+        self._nominal_supply = supply
+        self._random = random.Random(seed)
+        self._speed = speed
+        self._brownout = 1000.0 * brownout
+        self._world_time = 0        # ms since the simulation began
+        self._boot = 0
+        self._outgoing = bytearray()
+        self._handlers = {HELLO: self._on_hello, CONFIG: self._on_config, SET: self._on_set,
+                          ENABLE: self._on_enable, DISABLE: self._on_disable, ZERO: self._on_zero}
+        self.start()
+
+    def start(self):
+        """Start the firmware anew, as after a loss of power."""
+        self._boot += 1
+        self.time = 0
+        self.duty = 0.0
+        self.enabled = False
+        self.faults = set()
+        self._decoder = Decoder()
+        self._sequence = 0
+        self._period = PERIOD
+        self._watchdog = WATCHDOG
+        self.next_telemetry = PERIOD
+        self._next_ambient = 0
+        self._next_remark = 0
+        self._last_set = 0
+        self._accepted = None
+        self._counter_zero = self._last_counts = self.arm.encoder_counts
+        if self._boot == 1:
+            self._counter_zero = 0      # the encoder was set to zero when the arm was built
+        self._index = 0
+        self._latch = None
+        self._remark(f'simulated PWM board, protocol {VERSION}; say "hello 1*'
+                     + encode(HELLO, 1).decode('ascii').strip().partition('*')[2] + '"')
+
+    @property
+    def supply(self):
+        """Supply voltage in V now."""
+        low = 0.0 <= self._world_time - self._brownout < BROWNOUT_TIME
+        return self._nominal_supply * (BROWNOUT_SUPPLY if low else 1.0)
+
+    def receive(self, data):
+        """
+        Take bytes from the host.
+
+        Parameters
+        ----------
+        data : bytes
+            Any bytes at all.
+
+        """
+        for line in self._decoder.feed(data):
+            if isinstance(line, Frame):
+                self._obey(line)
+            elif isinstance(line, BadLine):
+                self._explain(line)
+
+    def transmit(self):
+        """
+        Give the bytes that go to the host.
+
+        Returns
+        -------
+        bytes
+            All that was written since the last call.
+
+        """
+        data = bytes(self._outgoing)
+        self._outgoing.clear()
+        return data
+
+    def advance(self, ticks=1):
+        """
+        Let time pass.
+
+        Parameters
+        ----------
+        ticks : int
+            Number of steps of `TICK` ms.
+
+        """
+        for _ in range(ticks):
+            self._look_at_supply()
+            self.arm.advance(TICK / 1000.0, self.supply * math.sqrt(self.duty))
+            self._world_time += TICK
+            self.time += TICK
+            self._count()
+            if 0.0 <= self._world_time - self._brownout - BROWNOUT_TIME < TICK:
+                self.start()
+            if self.time - self._last_set > self._watchdog and self.enabled:
+                self.duty = 0.0
+                self.faults.add('watchdog')
+            if self.time >= self.next_telemetry:
+                self.next_telemetry += self._period
+                self._send_telemetry()
+
+    def idle(self, ticks):
+        """
+        Let time pass for the arm while the board has no power.
+
+        Parameters
+        ----------
+        ticks : int
+            Number of steps of `TICK` ms.
+
+        """
+        for _ in range(ticks):
+            self.arm.advance(TICK / 1000.0, 0.0)
+            self._world_time += TICK
+
+    def _look_at_supply(self):
+        if self.supply < LOWEST_SUPPLY:
+            self.duty = 0.0
+            self.faults.add('supply')
+        else:
+            self.faults.discard('supply')
+
+    def _count(self):
+        """Watch the encoder for its index pulse, as the counter's hardware does."""
+        counts = self.arm.encoder_counts
+        before = (self._last_counts - INDEX_COUNTS) // COUNTS_PER_REVOLUTION
+        now = (counts - INDEX_COUNTS) // COUNTS_PER_REVOLUTION
+        self._last_counts = counts
+        if now != before:
+            self._index = (self._index + 1) % SEQUENCE_LIMIT
+            self._latch = (max(now, before) * COUNTS_PER_REVOLUTION + INDEX_COUNTS
+                           - self._counter_zero)
+
+    def _send_telemetry(self):
+        ambient = None
+        if self.time >= self._next_ambient:
+            self._next_ambient = self.time + AMBIENT_PERIOD
+            ambient = self.arm.ambient_temperature
+        self._send(TELEMETRY, Telemetry(
+            time=self.time % TIME_LIMIT, counts=self.arm.encoder_counts - self._counter_zero,
+            supply=max(self.supply + self._random.gauss(0.0, SUPPLY_NOISE), 0.0), duty=self.duty,
+            enabled=self.enabled, faults=tuple(sorted(self.faults)), index=self._index,
+            latch=self._latch, ambient=ambient, accepted=self._accepted).fields())
+
+    def _send(self, kind, fields):
+        self._outgoing += encode(kind, self._sequence, fields)
+        self._sequence = (self._sequence + 1) % SEQUENCE_LIMIT
+
+    def _remark(self, text):
+        self._outgoing += f'# {text}\n'.encode('ascii', 'backslashreplace')
+
+    def _explain(self, line):
+        """Tell a person what was wrong with a line; a broken cable must not flood the host."""
+        if self.time < self._next_remark:
+            return
+        self._next_remark = self.time + REMARK_PERIOD
+        hint = f'; its CRC would be *{line.checksum}' if line.checksum else ''
+        self._remark(f'nothing done, {line.reason}{hint}: {line.text}')
+
+    def _obey(self, frame):
+        handler = self._handlers.get(frame.kind)
+        try:
+            refusal = handler(frame) if handler else 'unknown_command'
+        except ProtocolError:
+            refusal = 'field_missing_or_no_number'
+        if refusal:
+            self._send(NO, {'re': frame.sequence, 'reason': refusal})
+        elif frame.kind not in (HELLO, SET):
+            self._send(OK, {'re': frame.sequence})
+
+    def _on_hello(self, frame):
+        self._send(BOARD, Identity(VERSION, 'simulated', '1', self._boot,
+                                   self.time % TIME_LIMIT, 32, self._speed).fields())
+
+    def _on_config(self, frame):
+        period, watchdog = integer(frame, 'period'), integer(frame, 'watchdog')
+        if period < 1 or watchdog < 1:
+            return 'out_of_range'
+        self._period = -(-period // TICK) * TICK
+        self._watchdog = watchdog
+        self.next_telemetry = self.time + self._period
+
+    def _on_enable(self, frame):
+        if not self.enabled:
+            self.duty = 0.0
+            self.enabled = True
+            self._last_set = self.time
+
+    def _on_disable(self, frame):
+        self.duty = 0.0
+        self.enabled = False
+        self.faults.discard('watchdog')
+
+    def _on_zero(self, frame):
+        self._counter_zero = self.arm.encoder_counts
+        self._index = 0
+        self._latch = None
+
+    def _on_set(self, frame):
+        duty = decimal(frame, 'duty')
+        if not 0.0 <= duty <= 1.0:
+            return 'out_of_range'
+        if not self.enabled:
+            return 'disabled'
+        if 'supply' in self.faults:
+            return 'supply'
+        self.duty = round(duty * PWM_STEPS) / PWM_STEPS
+        self.faults.discard('watchdog')
+        self._last_set = self.time
+        self._accepted = frame.sequence
+        return None

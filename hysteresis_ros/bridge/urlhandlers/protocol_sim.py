@@ -1,0 +1,301 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The port ``sim://bicep``: a simulated board on a simulated cable, to pyserial's interface.
+
+The arm lives as long as the port object, also while the port is closed, as a real arm would. Its
+time is the wall's time the chosen speed, taken up whenever somebody opens, reads or writes. A host
+that was itself held up finds the arm waiting: more than `LARGEST_LAG` is not made up for, nor is
+a speed that this machine cannot compute.
+"""
+
+import random
+import threading
+import time
+
+from serial.serialutil import PortNotOpenError, SerialBase, SerialException, to_bytes
+
+from hysteresis_ros.bridge.simulated_board import SimulatedBoard, TICK
+from hysteresis_ros.bridge.simulation_url import parse_url
+from hysteresis_ros.laboratory.effects import EFFECTS
+from hysteresis_ros.laboratory.plant import Plant
+
+LARGEST_LAG = 0.25      # s of the wall
+LARGEST_ABSENCE = 10.0  # s of the wall that are made up for when the port is opened
+LONGEST_WORK = 0.05     # s of the wall that one call computes at most
+LONGEST_WAIT = 0.02     # s of the wall between two looks at the clock
+
+
+def check_url(url):
+    """
+    Refuse a URL that makes no sense, before anybody opens it.
+
+    Parameters
+    ----------
+    url : str
+        As given for the parameter ``port``.
+
+    Raises
+    ------
+    ParameterError
+        If the arm, a key or a value is not known.
+
+    """
+    make_plant(parse_url(url, EFFECTS))
+
+
+def make_plant(simulation):
+    """
+    Build the specimen of the virtual laboratory that a URL asks for.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        As read from the URL.
+
+    Returns
+    -------
+    Plant
+
+    Raises
+    ------
+    ParameterError
+        If an effect cannot have this strength.
+
+    """
+    return Plant(simulation.seed, simulation.effects, simulation.time_constant,
+                 simulation.recording, simulation.recording_time)
+
+
+class Cable:
+    """
+    The way between host and board, with its faults.
+
+    Parameters
+    ----------
+    board : SimulatedBoard
+        At the far end.
+    simulation : Simulation
+        Which faults, and when.
+
+    """
+
+    def __init__(self, board, simulation):
+        self.board = board
+        self.received = bytearray()     # what the host can read
+        self._simulation = simulation
+        self._ticks = 0
+        self._plugged = True
+        self._to_board = random.Random(f'to board {simulation.seed}')
+        self._to_host = random.Random(f'to host {simulation.seed}')
+
+    @property
+    def time(self):
+        """Time in s since the arm began to live."""
+        return self._ticks * TICK / 1000.0
+
+    @property
+    def plugged(self):
+        """Whether the cable is in."""
+        return self._plugged
+
+    def write(self, data):
+        """Take bytes from the host."""
+        if not self._lasts('deaf'):
+            self.board.receive(self._drop(data, self._to_board))
+        self._fetch()
+
+    def tick(self):
+        """Let `TICK` ms pass."""
+        plugged = not self._lasts('unplug')
+        if plugged and not self._plugged:
+            self.board.start()
+        if self._plugged and not plugged:
+            self.received.clear()
+        self._plugged = plugged
+        if plugged:
+            self.board.advance()
+        else:
+            self.board.idle(1)
+        self._ticks += 1
+        self._fetch()
+
+    def _lasts(self, fault):
+        begin = getattr(self._simulation, f'{fault}_after')
+        return 0.0 <= self.time - begin < getattr(self._simulation, f'{fault}_for')
+
+    def _fetch(self):
+        data = self.board.transmit()
+        if not data or not self._plugged or self._lasts('silent'):
+            return
+        if self._to_host.random() < self._simulation.garbage:
+            self.received += self._to_host.randbytes(self._to_host.randint(1, 40))
+        self.received += self._drop(data, self._to_host)
+
+    def _drop(self, data, chance):
+        if not self._simulation.drop:
+            return data
+        return bytes(byte for byte in data if chance.random() >= self._simulation.drop)
+
+
+class Serial(SerialBase):
+    """The simulated board as a port; made by `serial.serial_for_url`."""
+
+    def __init__(self, *args, **kwargs):
+        self._cable = None
+        self._speed = 1.0
+        self._origin = 0.0      # wall time at which the arm's time was, or would have been, 0
+        self._ticks = 0
+        self._changed = threading.Condition()
+        self._cancelled = False
+        super().__init__(*args, **kwargs)
+
+    def open(self):
+        """
+        Open the port; the first time, build board and arm.
+
+        Raises
+        ------
+        ParameterError
+            If the URL makes no sense.
+        SerialException
+            If the port is open, or the simulated cable is unplugged.
+
+        """
+        if self.is_open:
+            raise SerialException('Port is already open.')
+        with self._changed:
+            if self._cable is None:
+                self._build()
+            self._catch_up(LARGEST_ABSENCE, LARGEST_ABSENCE)
+            if not self._cable.plugged:
+                raise SerialException('the cable is unplugged')
+            self._cable.received.clear()
+            self.is_open = True
+
+    def _build(self):
+        simulation = parse_url(self.port, EFFECTS)
+        arm = make_plant(simulation).arm
+        board = SimulatedBoard(arm, supply=simulation.supply, seed=simulation.seed,
+                               speed=simulation.speed, brownout=simulation.brownout)
+        self._speed = simulation.speed
+        self._cable = Cable(board, simulation)
+        self._origin = time.monotonic()
+
+    def close(self):
+        """Close the port. The arm goes on living; the board's watchdog looks after it."""
+        with self._changed:
+            self.is_open = False
+            self._changed.notify_all()
+
+    def read(self, size=1):
+        """
+        Read up to `size` bytes, waiting for them no longer than ``timeout``.
+
+        Raises
+        ------
+        SerialException
+            If the port is closed or the simulated cable is pulled.
+
+        """
+        deadline = None if self._timeout is None else time.monotonic() + self._timeout
+        with self._changed:
+            while True:
+                self._live()
+                received = self._cable.received
+                now = time.monotonic()
+                late = deadline is not None and now >= deadline
+                if len(received) >= size or late or self._cancelled:
+                    self._cancelled = False
+                    data = bytes(received[:size])
+                    del received[:size]
+                    return data
+                left = LONGEST_WAIT if deadline is None else deadline - now
+                self._changed.wait(min(left, LONGEST_WAIT, self._until_telemetry(now)))
+
+    def write(self, data):
+        """
+        Write bytes to the board, which gets them at once.
+
+        Raises
+        ------
+        SerialException
+            If the port is closed or the simulated cable is pulled.
+
+        """
+        data = to_bytes(data)
+        with self._changed:
+            self._live()
+            self._cable.write(data)
+            self._changed.notify_all()
+        return len(data)
+
+    def cancel_read(self):
+        """Let a waiting `read` return with what it has."""
+        with self._changed:
+            self._cancelled = True
+            self._changed.notify_all()
+
+    @property
+    def in_waiting(self):
+        """Number of bytes that can be read without waiting."""
+        with self._changed:
+            self._live()
+            return len(self._cable.received)
+
+    @property
+    def out_waiting(self):
+        """Number of bytes still to be sent: none, ever."""
+        return 0
+
+    def flush(self):
+        """Wait until everything is sent: it is."""
+
+    def reset_input_buffer(self):
+        """Throw away what has not been read."""
+        with self._changed:
+            self._live()
+            self._cable.received.clear()
+
+    def reset_output_buffer(self):
+        """Throw away what has not been sent: nothing."""
+
+    def _live(self):
+        if not self.is_open:
+            raise PortNotOpenError()
+        self._catch_up(LARGEST_LAG, LONGEST_WORK)
+        if not self._cable.plugged:
+            raise SerialException('the cable was unplugged')
+
+    def _catch_up(self, largest_lag, longest_work):
+        now = time.monotonic()
+        rate = 1000.0 * self._speed / TICK
+        due = int((now - self._origin) * rate) - self._ticks
+        excess = due - max(1, int(largest_lag * rate))
+        if excess > 0:
+            self._origin += excess / rate
+            due -= excess
+        while due > 0:
+            self._cable.tick()
+            self._ticks += 1
+            due -= 1
+            if time.monotonic() - now > longest_work:
+                return
+
+    def _until_telemetry(self, now):
+        """Return the wall's time in s from `now` until the board will send again."""
+        board = self._cable.board
+        ahead = (self._ticks * TICK + board.next_telemetry - board.time) / 1000.0 / self._speed
+        return max(ahead - (now - self._origin), 0.0)
+
+    def _reconfigure_port(self):
+        """Take new settings: baud rate and the like mean nothing here."""
+
+    def _update_break_state(self):
+        """Set the break condition: means nothing here."""
+
+    def _update_rts_state(self):
+        """Set a line: means nothing here."""
+
+    def _update_dtr_state(self):
+        """Set a line: means nothing here."""

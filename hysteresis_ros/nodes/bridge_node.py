@@ -1,0 +1,381 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The board as a node: volts in, joint states out, the muscle off whenever anything is amiss.
+
+Subscribes `voltage_setpoint`; publishes `joint_states`, `applied_voltage`, `ambient_temperature`
+and, on a simulated board that does not live at real time, ``/clock``. The port is read and written
+by threads of `Board`, so no callback ever waits for it; what the board measures is published from
+the reading thread at once.
+
+The output goes to zero when no setpoint came for ``setpoint_timeout``, when the board is silent
+for ``telemetry_timeout``, and first of all when the node ends. A setpoint that is no number or out
+of the limits never reaches the board and does not renew the one before.
+"""
+
+import threading
+import time
+
+from builtin_interfaces.msg import Time
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import JointState, Temperature
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, Trigger
+
+from hysteresis_ros.bridge.board import Board
+from hysteresis_ros.bridge.board_link import Timeouts
+from hysteresis_ros.bridge.encoder import Encoder
+from hysteresis_ros.bridge.heat_and_cool import HeatAndCool
+from hysteresis_ros.bridge.pwm import Pwm
+from hysteresis_ros.bridge.stamps import RealStamps, SimulatedStamps
+from hysteresis_ros.errors import BoardError, ParameterError, RangeError
+from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, OK, WARN
+from hysteresis_ros.nodes.parameters import NAMES, Parameters, Spec, VOLTAGE_LIMITS
+from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
+from hysteresis_ros.nodes.running import run
+
+LOOK_PERIOD = 0.05          # s of the wall between two looks at the board's status
+ENABLE_PATIENCE = 3.0       # s of the wall that ~/enable waits for the board to follow
+BAD_LINES_SHOWN_FOR = 5.0   # s of the wall after the latest bad line
+
+BOARD = (
+    Spec('port', 'sim://bicep', 'Device or pyserial URL of the board; sim://bicep?speed=60&seed=1 '
+         'and the like for the simulated one', read_only=True),
+    Spec('baud', 115200, 'Speed of the serial line', 'bit/s', 1200, 4000000, read_only=True),
+    Spec('telemetry_rate', 10.0, 'How often the board reports', 'Hz', 0.1, 200.0, read_only=True),
+    Spec('start_enabled', True, 'Whether setpoints are followed from the start, without ~/enable',
+         read_only=True),
+    Spec('setpoint_timeout', 2.0, 'Time without a setpoint after which the output is zero; by the '
+         'slower of wall clock and board clock', 's', 0.05, 600.0, read_only=True),
+    Spec('telemetry_timeout', 1.0, 'Time without telemetry after which the board counts as lost; '
+         'by the slower clock', 's', 0.05, 600.0, read_only=True),
+    Spec('board_watchdog', 1.0, 'Time without a word from this node after which the board '
+         'switches off on its own; by the slower clock', 's', 0.3, 60.0, read_only=True),
+)
+
+OUTPUT = (
+    Spec('pwm_law', 'rms', "What the voltage stands for: 'rms', duty = (V / supply)^2, because "
+         "heating follows the mean square; 'mean', duty = V / supply", read_only=True),
+    Spec('maximum_duty', 1.0, 'Largest duty', '', 0.01, 1.0),
+    Spec('supply_voltage', 12.0, 'Nominal voltage of the supply', 'V', 1.0, 60.0, read_only=True),
+    Spec('supply_tolerance', 0.25, 'Share by which the measured supply may differ; beyond, the '
+         'output is off', '', 0.01, 0.9, read_only=True),
+)
+
+ENCODER = (
+    Spec('counts_per_revolution', 8192, 'Quadrature counts in a turn: four times the pulses',
+         '', 4, 1000000, read_only=True),
+    Spec('encoder_direction', 1, '1 if counts grow with the angle, -1 if they fall', '', -1, 1,
+         read_only=True),
+    Spec('encoder_zero', 0.0, 'Angle at count 0', 'rad', -6.3, 6.3, read_only=True),
+    Spec('encoder_index', 'ignore', "What the index pulse is for: 'ignore'; 'check' that no "
+         "counts are lost; 'home': it comes at encoder_index_angle", read_only=True),
+    Spec('encoder_index_angle', 0.0, 'Angle at the index pulse', 'rad', -6.3, 6.3,
+         read_only=True),
+    Spec('encoder_maximum_speed', 30.0, 'Speed that the arm cannot exceed; faster counts are not '
+         'believed', 'rad/s', 0.1, 1000.0, read_only=True),
+    Spec('velocity_window', 0.1, 'Time over which the velocity is taken', 's', 0.0, 10.0,
+         read_only=True),
+)
+
+INITIALISATION = (
+    Spec('initialise_voltage', 6.0, 'Heating voltage of ~/initialise, at most maximum_voltage',
+         'V', 0.1, 48.0),
+    Spec('initialise_heat_time', 30.0, 'Heating time of ~/initialise', 's', 1.0, 3600.0),
+    Spec('initialise_cool_time', 60.0, 'Shortest cooling time of ~/initialise', 's', 1.0, 3600.0),
+)
+
+
+class BridgeNode(Node):
+    """
+    The node `hardware_bridge`.
+
+    Parameters
+    ----------
+    **options
+        For `rclpy.node.Node`, such as ``namespace`` or ``parameter_overrides``.
+    """
+
+    PARAMETERS = BOARD + OUTPUT + ENCODER + INITIALISATION + VOLTAGE_LIMITS + NAMES
+
+    def __init__(self, **options):
+        super().__init__('hardware_bridge', **options)
+        self._parameters = parameters = Parameters(
+            self, self.PARAMETERS, check=_check, changed=self._configure)
+        self._board = Board(
+            parameters['port'], parameters['baud'], _pwm(parameters), _encoder(parameters),
+            Timeouts(setpoint=parameters['setpoint_timeout'],
+                     telemetry=parameters['telemetry_timeout'],
+                     watchdog=parameters['board_watchdog']),
+            1.0 / parameters['telemetry_rate'], parameters['supply_voltage'],
+            parameters['supply_tolerance'], self._on_sample)
+        self._lock = threading.Lock()   # of what callbacks and the reading thread share:
+        self._cycle = None              # the heat and cool cycle that is running
+        self._outcome = None            # its end: (success, message)
+        self._progress = ''
+        self._stamps = None
+        self._wall = Clock(clock_type=ClockType.STEADY_TIME)
+        self._waiting = []              # (is it so?, future, wall time until which to wait)
+        self._wanted = parameters['start_enabled']
+        self._taken = self._refused = 0
+        self._bad_lines = (0, -BAD_LINES_SHOWN_FOR)
+        self._joints = self.create_publisher(JointState, 'joint_states', MEASUREMENTS)
+        self._voltages = self.create_publisher(Float64, 'applied_voltage', MEASUREMENTS)
+        self._ambients = self.create_publisher(Temperature, 'ambient_temperature', MEASUREMENTS)
+        self._clocks = None
+        self._diagnostics = Diagnostics(
+            self, parameters['hardware_id'], self._values, 'board and arm are fine')
+        self.create_subscription(Float64, 'voltage_setpoint', self._on_setpoint, COMMANDS)
+        self.create_service(SetBool, '~/enable', self._on_enable)
+        self.create_service(Trigger, '~/initialise', self._on_initialise)
+        self.create_timer(LOOK_PERIOD, self._look, clock=self._wall)
+        self._board.enable(self._wanted)
+        self._board.start()
+
+    def on_shutdown(self):
+        """Write zero to the board, before anything else ends."""
+        self._board.stop()
+
+    def _configure(self, parameters):
+        self._board.pwm = _pwm(parameters)
+
+    # Setpoints and services
+
+    def _on_setpoint(self, message):
+        try:
+            with self._lock:
+                if self._cycle is not None:
+                    raise RangeError(f'voltage setpoint {message.data:g} V refused: the heat and '
+                                     'cool cycle is running')
+                self._board.set_voltage(message.data)
+        except RangeError as error:
+            self._refused += 1
+            self._diagnostics.set('setpoint', WARN, str(error))
+            return
+        self._taken += 1
+        self._diagnostics.clear('setpoint')
+
+    async def _on_enable(self, request, response):
+        wanted = request.data
+        status = self._board.status
+        if wanted and not status.online:
+            response.message = f'not enabled: {status.problem or "there is no board yet"}'
+            return response
+        self._wanted = wanted
+        self._board.enable(wanted)
+        if wanted:
+            self._board.forgive()
+        if not status.online:
+            response.success = True
+            response.message = 'disabled; the board is not there, and will stay off'
+            return response
+        response.success = await self._until(
+            lambda status: status.online and status.sample.enabled == wanted, ENABLE_PATIENCE)
+        response.message = 'enabled' if wanted else 'disabled'
+        if not response.success:
+            response.message = f'the board did not follow: {self._board.status.problem}'
+        return response
+
+    async def _on_initialise(self, request, response):
+        status = self._board.status
+        if not (status.online and status.sample.enabled):
+            response.message = f'not begun: {status.problem or "the output is not enabled"}'
+            return response
+        with self._lock:
+            if self._cycle is not None:
+                response.message = f'not begun: one is running ({self._progress})'
+                return response
+            self._outcome = None
+            self._progress = 'begun'
+            self._cycle = _cycle(self._parameters)
+        await self._until(lambda status: self._outcome is not None)
+        response.success, response.message = self._outcome
+        self._diagnostics.clear('setpoint')
+        self.get_logger().info(f'~/initialise: {response.message}')
+        return response
+
+    async def _until(self, condition, patience=float('inf')):
+        """Let other callbacks run until the board's status is as wanted; False if it is not."""
+        future = Future()
+        self._waiting.append((condition, future, time.monotonic() + patience))
+        return await future
+
+    # What the board says, in its reading thread
+
+    def _on_sample(self, sample):
+        if not self.context.ok():
+            return
+        stamp = self._stamp(sample)
+        self._voltages.publish(Float64(data=sample.voltage))
+        if sample.fresh:
+            message = JointState(name=[self._parameters['joint_name']], position=[sample.angle],
+                                 velocity=[sample.velocity])
+            message.header.stamp = stamp
+            self._joints.publish(message)
+        if sample.ambient is not None:
+            message = Temperature(temperature=sample.ambient)
+            message.header.stamp = stamp
+            self._ambients.publish(message)
+        with self._lock:
+            if self._cycle is not None:
+                self._heat_and_cool(sample)
+
+    def _stamp(self, sample):
+        speed = self._board.speed
+        now = 1e-9 * self.get_clock().now().nanoseconds
+        if speed == 1.0:
+            if self._stamps is None:
+                self._stamps = RealStamps()
+            return _message(self._stamps.stamp(sample.time, now))
+        with self._lock:
+            if self._stamps is None:
+                self._stamps = SimulatedStamps(time.time() - sample.time, speed)
+            stamp = _message(self._stamps.stamp(sample.time, time.monotonic()))
+            if self._clocks is not None:
+                self._clocks.publish(ClockMessage(clock=stamp))
+        return stamp
+
+    def _heat_and_cool(self, sample):
+        try:
+            if not sample.enabled:
+                raise BoardError('heat and cool cycle: the output was switched off meanwhile')
+            phase = self._cycle.update(sample.time, sample.angle, sample.voltage)
+        except BoardError as error:
+            self._end_cycle(False, str(error))
+            return
+        self._progress = phase.progress
+        if phase.done:
+            self._end_cycle(True, 'heated and cooled: the memory is wiped')
+        elif phase.voltage > 0.0:
+            self._board.set_voltage(phase.voltage)
+        else:
+            self._board.rest()
+
+    def _end_cycle(self, success, message):
+        self._board.rest()
+        self._cycle = None
+        self._outcome = success, message
+
+    # The board's status, in the executor
+
+    def _look(self):
+        if not self.context.ok():
+            return
+        status = self._board.status
+        self._keep_clock(status)
+        if not status.online:
+            with self._lock:
+                if self._cycle is not None:
+                    self._end_cycle(False, f'heat and cool cycle: {status.problem}')
+        self._judge(status)
+        now = time.monotonic()
+        waiting, self._waiting = self._waiting, []
+        for condition, future, deadline in waiting:
+            if condition(status):
+                future.set_result(True)
+            elif now > deadline:
+                future.set_result(False)
+            else:
+                self._waiting.append((condition, future, deadline))
+
+    def _keep_clock(self, status):
+        if status.identity is None or status.identity.speed == 1.0:
+            return
+        if self._clocks is None:
+            self._clocks = self.create_publisher(ClockMessage, '/clock', 10)
+        with self._lock:
+            if not status.online and self._stamps is not None:
+                self._clocks.publish(
+                    ClockMessage(clock=_message(self._stamps.idle(time.monotonic()))))
+
+    def _judge(self, status):
+        sample = status.sample
+        if not status.online and not status.problem:
+            self._diagnostics.set('board', OK, f'looking for the board at '
+                                  f'{self._parameters["port"]}')
+        else:
+            self._tell('board', ERROR, status.problem)
+        self._tell('faults', ERROR, status.faults if status.online else '')
+        self._tell('supply', ERROR, status.limit)
+        self._tell('timeout', WARN, 'no setpoint for setpoint_timeout '
+                   f'({self._parameters["setpoint_timeout"]:g} s): the output is zero until the '
+                   'next one' if status.expired else '')
+        self._tell('encoder', WARN, f'{sample.encoder_fault} (~/enable ends this warning)'
+                   if sample and sample.encoder_fault else '')
+        self._tell('output', OK, '' if self._wanted else 'the output is disabled, see ~/enable')
+        self._tell('initialise', OK, f'heat and cool cycle: {self._progress}; setpoints are '
+                   'refused' if self._cycle is not None else '')
+        self._judge_lines(status)
+
+    def _judge_lines(self, status):
+        now = time.monotonic()
+        count, since = self._bad_lines
+        if status.bad_lines > count:
+            self._bad_lines = status.bad_lines, now
+            self._diagnostics.set('lines', WARN, (
+                f'{status.bad_lines} bad lines so far, skipped; the latest is '
+                f'{status.last_bad_line}'))
+        elif now - since > BAD_LINES_SHOWN_FOR:
+            self._diagnostics.clear('lines')
+
+    def _tell(self, name, level, sentence):
+        if sentence:
+            self._diagnostics.set(name, level, sentence)
+        else:
+            self._diagnostics.clear(name)
+
+    def _values(self):
+        status = self._board.status
+        values = {
+            'port': self._parameters['port'], 'online': status.online,
+            'board': status.identity.name if status.identity else 'unknown',
+            'connections': status.connections, 'frames': status.frames,
+            'bad lines': status.bad_lines, 'lost frames': status.lost_frames,
+            'latest refusal of the board': status.refusal or 'none',
+            'setpoints taken': self._taken, 'setpoints refused': self._refused}
+        sample = status.sample
+        if sample is not None:
+            values.update({
+                'board time [s]': sample.time, 'angle [rad]': sample.angle,
+                'applied voltage [V]': sample.voltage, 'supply [V]': sample.supply,
+                'enabled': sample.enabled})
+        return values
+
+
+def _pwm(values):
+    return Pwm(values['pwm_law'], values['minimum_voltage'], values['maximum_voltage'],
+               values['maximum_duty'])
+
+
+def _encoder(values):
+    return Encoder(
+        values['counts_per_revolution'], values['encoder_direction'], values['encoder_zero'],
+        maximum_speed=values['encoder_maximum_speed'], velocity_window=values['velocity_window'],
+        index=values['encoder_index'], index_angle=values['encoder_index_angle'])
+
+
+def _cycle(values):
+    return HeatAndCool(min(values['initialise_voltage'], values['maximum_voltage']),
+                       values['initialise_heat_time'], values['initialise_cool_time'])
+
+
+def _check(values):
+    _pwm(values)
+    _encoder(values)
+    if values['telemetry_timeout'] * values['telemetry_rate'] < 2.0:
+        raise ParameterError(
+            f'telemetry_timeout {values["telemetry_timeout"]:g} s has to be at least two periods '
+            f'of the telemetry_rate {values["telemetry_rate"]:g} Hz')
+
+
+def _message(seconds):
+    whole = int(seconds)
+    return Time(sec=whole, nanosec=min(int(1e9 * (seconds - whole)), 999_999_999))
+
+
+def main(args=None) -> int:
+    """Run the node."""
+    return run(BridgeNode, args)

@@ -1,0 +1,226 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The port sim://bicep: its URL, its faults, and pyserial's interface to it."""
+
+import threading
+import time
+from types import SimpleNamespace
+
+from hysteresis_ros.bridge.protocol import Decoder, encode, Frame
+from hysteresis_ros.bridge.simulated_board import SimulatedBoard, TICK
+from hysteresis_ros.bridge.simulation_url import parse_url, Simulation
+from hysteresis_ros.bridge.urlhandlers import protocol_sim
+from hysteresis_ros.bridge.urlhandlers.protocol_sim import Cable
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory.plant import Plant
+import pytest
+import serial
+
+EFFECTS = {'supply_sag', 'payload_error'}
+
+
+def open_port(url, **options):
+    package = 'hysteresis_ros.bridge.urlhandlers'
+    if package not in serial.protocol_handler_packages:
+        serial.protocol_handler_packages.append(package)
+    return serial.serial_for_url(url, **options)
+
+
+def cable(**options):
+    simulation = Simulation(**options)
+    return Cable(SimulatedBoard(Plant(0).arm, brownout=simulation.brownout), simulation)
+
+
+def frames(data):
+    return [line for line in Decoder().feed(bytes(data)) if isinstance(line, Frame)]
+
+
+def test_url_without_keys_is_a_perfect_arm_at_real_time():
+    assert parse_url('sim://bicep', EFFECTS) == Simulation()
+    assert parse_url('SIM://Bicep/', EFFECTS) == Simulation()
+
+
+def test_every_key():
+    simulation = parse_url(
+        'sim://bicep?speed=60&seed=3&recording=2&recording_time=100&time_constant=2&supply=24'
+        '&drop=0.01&garbage=0.1&brownout=5&unplug_after=1&unplug_for=2&silent_after=3'
+        '&silent_for=4&deaf_after=5&deaf_for=6&supply_sag=0.4&payload_error=-1', EFFECTS)
+    assert simulation == Simulation(60.0, 3, 2, 100.0, 2.0, 24.0, 0.01, 0.1, 5.0, 1.0, 2.0, 3.0,
+                                    4.0, 5.0, 6.0, {'supply_sag': 0.4, 'payload_error': -1.0})
+
+
+@pytest.mark.parametrize('url, words', [
+    ('sim://leg', 'sim://bicep'), ('sim://', 'sim://bicep'), ('sim://bicep/x', 'sim://bicep'),
+    ('sim://bicep?sped=60', "no 'sped'; keys are speed, seed"), ('sim://bicep?speed', 'speed'),
+    ('sim://bicep?speed=', 'a number from 0.01'), ('sim://bicep?speed=fast', 'speed=fast'),
+    ('sim://bicep?speed=0', 'from 0.01 to 1000'), ('sim://bicep?speed=nan', 'speed=nan'),
+    ('sim://bicep?drop=0.9', 'from 0 to 0.5'), ('sim://bicep?seed=1.5', 'a whole number'),
+    ('sim://bicep?seed=1&seed=2', 'seed is given twice'),
+    ('sim://bicep?unplug_after=-1', 'from 0 to inf'), ('sim://bicep?supply_sag=x', 'supply_sag=x')])
+def test_urls_that_make_no_sense_say_so_in_one_line(url, words):
+    with pytest.raises(ParameterError) as error:
+        parse_url(url, EFFECTS)
+    assert words in str(error.value) and '\n' not in str(error.value)
+
+
+def test_strengths_that_no_effect_has_are_refused_before_opening():
+    with pytest.raises(ParameterError, match='supply_sag'):
+        protocol_sim.check_url('sim://bicep?supply_sag=50')
+
+
+def test_effects_reach_the_arm():
+    clean, heavy = (protocol_sim.make_plant(parse_url(url, EFFECTS)).arm
+                    for url in ('sim://bicep', 'sim://bicep?payload_error=1'))
+    for arm in (clean, heavy):
+        arm.advance(30.0, 4.0)
+    assert heavy.angle > clean.angle + 0.01
+
+
+def test_perfect_cable_delivers_every_byte():
+    wire = cable()
+    for _ in range(100):
+        wire.tick()
+    assert [frame.sequence for frame in frames(wire.received)] == list(range(2000 // 100))
+    assert wire.time == pytest.approx(2.0)
+
+
+def test_drop_loses_about_as_much_as_asked_in_both_directions():
+    wire = cable(drop=0.1)
+    for _ in range(1000):
+        wire.tick()
+    whole = cable()
+    for _ in range(1000):
+        whole.tick()
+    assert 0.87 < len(wire.received) / len(whole.received) < 0.93
+    for i in range(500):
+        wire.write(encode('hello', i))
+    heard = wire.board._decoder.frames
+    assert 500 * 0.9 ** 13 * 0.6 < heard < 500 * 0.9 ** 13 * 1.5
+
+
+def test_garbage_comes_between_frames():
+    wire = cable(garbage=1.0)
+    for _ in range(200):
+        wire.tick()
+    decoder = Decoder()
+    decoder.feed(bytes(wire.received))
+    assert decoder.bad_lines > 20
+
+
+def test_faults_repeat_with_the_seed():
+    def received(seed):
+        wire = cable(seed=seed, drop=0.05, garbage=0.3)
+        for _ in range(100):
+            wire.tick()
+        return bytes(wire.received)
+
+    assert received(1) == received(1) != received(2)
+
+
+def test_silence_begins_and_ends():
+    wire = cable(silent_after=1.0, silent_for=2.0)
+    for _ in range(4000 // TICK):
+        wire.tick()
+    times = [int(frame.fields['time']) for frame in frames(wire.received)]
+    assert 900 in times and 3100 in times
+    assert not [time for time in times if 1000 < time < 3000]
+
+
+def test_deaf_board_lets_its_watchdog_bite():
+    wire = cable(deaf_after=1.0)
+    wire.write(encode('enable', 1))
+    for _ in range(3000 // TICK):
+        wire.write(encode('set', 2, {'duty': 0.1}))
+        wire.tick()
+    assert wire.board.duty == 0.0 and 'watchdog' in wire.board.faults
+
+
+def test_pulled_cable_takes_the_power_with_it():
+    wire = cable(unplug_after=1.0, unplug_for=1.0)
+    wire.write(encode('enable', 1))
+    for _ in range(1000 // TICK + 1):
+        wire.write(encode('set', 2, {'duty': 0.25}))
+        wire.tick()
+    assert not wire.plugged and not wire.received
+    for _ in range(1000 // TICK):
+        wire.tick()
+    assert wire.plugged and wire.board.duty == 0.0 and not wire.board.enabled
+    assert wire.board.time <= 2 * TICK
+
+
+def test_port_speaks_pyserial():
+    with open_port('sim://bicep?speed=20', timeout=2.0) as port:
+        assert port.is_open and port.out_waiting == 0
+        assert port.write(b'\n' + encode('hello', 7)) == 14
+        line = b''
+        while not line.startswith(b'board '):
+            line = port.readline()
+        port.flush()
+        port.reset_output_buffer()
+        port.reset_input_buffer()
+        assert port.in_waiting < 500
+        port.baudrate = 9600
+        port.timeout = 0
+        assert isinstance(port.read(1), bytes)
+        with pytest.raises(serial.SerialException, match='already'):
+            port.open()
+    with pytest.raises(serial.SerialException):
+        port.read(1)
+
+
+def test_waiting_read_can_be_ended():
+    with open_port('sim://bicep?silent_after=0') as port:
+        thread = threading.Timer(0.1, port.cancel_read)
+        thread.start()
+        assert port.read(10 ** 6) == b''
+        thread.join()
+
+
+def test_read_waits_no_longer_than_its_timeout():
+    with open_port('sim://bicep?silent_after=0', timeout=0.05) as port:
+        before = time.monotonic()
+        assert port.read(10) == b''
+        assert time.monotonic() - before >= 0.05
+
+
+def test_time_follows_the_speed(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    port = open_port('sim://bicep?speed=50', timeout=0)
+    for _ in range(10):
+        now[0] += 0.1
+        assert port.in_waiting
+    assert port._cable.time == pytest.approx(50.0, abs=2 * TICK / 1000.0)
+
+
+def test_host_that_was_held_up_finds_the_arm_waiting(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    port = open_port('sim://bicep', timeout=0)
+    now[0] += 60.0
+    assert port.in_waiting
+    assert port._cable.time == pytest.approx(protocol_sim.LARGEST_LAG, abs=TICK / 1000.0)
+
+
+def test_arm_lives_on_while_the_port_is_closed(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    port = open_port('sim://bicep?unplug_after=1&unplug_for=3', timeout=0)
+    for _ in range(8):
+        now[0] += 0.1
+        port.read(100)
+    now[0] += 0.24
+    with pytest.raises(serial.SerialException, match='unplugged'):
+        port.read(100)
+    port.close()
+    now[0] += 1.0
+    with pytest.raises(serial.SerialException, match='unplugged'):
+        port.open()
+    now[0] += 2.5
+    port.open()
+    assert port._cable.board.time < 1000
+
+
+def test_wrong_url_is_refused_on_opening():
+    with pytest.raises(ParameterError, match='sped'):
+        open_port('sim://bicep?sped=1')
