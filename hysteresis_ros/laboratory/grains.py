@@ -5,8 +5,9 @@ A wire's grains: each turns from martensite into austenite when heated, and back
 
 A grain turns to austenite around its own temperature A and back to martensite around M < A. Stress
 favours martensite and moves both up by sigma / C (Clausius-Clapeyron), so what a grain feels is the
-temperature less that shift. A grain does not turn all at once but over `SMEAR` kelvin: the
-population then answers continuously and its equilibrium with a spring or an arm can be solved for.
+temperature less that shift, which is not quite the same on heating and on cooling. A grain does
+not turn all at once but over `SMEAR` kelvin: the population then answers continuously and its
+equilibrium with a spring or an arm can be solved for.
 """
 
 import dataclasses
@@ -55,7 +56,7 @@ class GrainDistribution:
     shape: float = 1.6
     tail: float = 0.42
     loop: float = 4.6
-    loop_growth: float = 8.0
+    loop_growth: float = 7.0
     loop_spread: float = 2.0
 
     def temperatures(self, count: int, offset: float) -> tuple[np.ndarray, np.ndarray]:
@@ -93,22 +94,28 @@ class Grains:
         self._next = np.ones(len(heating))
         self._work = np.ones(len(heating))
 
-    def _turn(self, felt: float) -> np.ndarray:
+    def _turn(self, heating: float, cooling: float) -> np.ndarray:
         # Martensite may not exceed what heating leaves, nor fall below what cooling has formed.
-        scaled = felt / SMEAR
-        result = np.subtract(self._lower, scaled, out=self._next)
+        result = np.subtract(self._lower, cooling / SMEAR, out=self._next)
         np.maximum(result, self._share, out=result)
-        np.minimum(result, np.subtract(self._upper, scaled, out=self._work), out=result)
+        np.minimum(result, np.subtract(self._upper, heating / SMEAR, out=self._work), out=result)
         np.maximum(result, 0.0, out=result)
         return np.minimum(result, 1.0, out=result)
 
-    def peek(self, felt: float) -> float:
-        """Return the martensite share at the felt temperature [degC]; the state stays."""
-        return float(np.add.reduce(self._turn(felt))) / len(self._share)
+    def peek(self, heating: float, cooling: float) -> float:
+        """
+        Return the martensite share that the grains would have; their state stays.
 
-    def commit(self, felt: float) -> float:
-        """Bring the grains to the felt temperature [degC] and return the martensite share."""
-        share = float(np.add.reduce(self._turn(felt))) / len(self._share)
+        Parameters
+        ----------
+        heating, cooling : float
+            Temperature felt by the turn to austenite and by the turn back [degC].
+        """
+        return float(np.add.reduce(self._turn(heating, cooling))) / len(self._share)
+
+    def commit(self, heating: float, cooling: float) -> float:
+        """Bring the grains to the felt temperatures [degC] and return the martensite share."""
+        share = float(np.add.reduce(self._turn(heating, cooling))) / len(self._share)
         self._share, self._next = self._next, self._share
         return share
 

@@ -45,7 +45,9 @@ class WireMaterial:
     orienting_stress : float
         Stress sigma_H over which the transformation strain saturates [Pa].
     clausius_clapeyron : float
-        Stress that shifts the transformation by one kelvin, C [Pa/K].
+        Stress that shifts the transformation to austenite by one kelvin, C [Pa/K].
+    cooling_ratio : float
+        C of the transformation back over that.
     grains : GrainDistribution
         Transformation temperatures at zero stress.
     grain_count : int
@@ -69,6 +71,7 @@ class WireMaterial:
     largest_strain: float = 0.0575
     orienting_stress: float = 110e6
     clausius_clapeyron: float = 7.0e6
+    cooling_ratio: float = 1.03
     grains: GrainDistribution = GrainDistribution()
     grain_count: int = 400
     grain_offset: float = 0.0
@@ -132,6 +135,7 @@ class Wire:
         self._heating, self._cooling = material.grains.temperatures(
             material.grain_count, material.grain_offset)
         self._shift = 1.0 / (material.section * material.clausius_clapeyron)
+        self._cooling_shift = self._shift / material.cooling_ratio
         self._early_shift = 1.0 / (material.section * material.early_clausius_clapeyron)
         self._rest = material.strain(1.0, 1.0, material.pretension / material.section)
         self.heat_and_cool()
@@ -164,7 +168,8 @@ class Wire:
 
     def peek_martensite(self, temperature: float, tension: float) -> float:
         """Return the martensite share at a temperature [degC] and tension [N]; memory stays."""
-        return self._grains.peek(temperature - self._shift * tension)
+        return self._grains.peek(temperature - self._shift * tension,
+                                 temperature - self._cooling_shift * tension)
 
     def elongation(self, temperature: float, tension: float) -> float:
         """
@@ -177,16 +182,20 @@ class Wire:
         tension : float
             Tension [N], at least 0.
         """
-        martensite = self._grains.peek(temperature - self._shift * tension)
-        early = 1.0 if self._early is None else self._early.peek(
-            temperature - self._early_shift * tension)
-        return self._length(martensite, early, tension)
+        early = 1.0
+        if self._early is not None:
+            felt = temperature - self._early_shift * tension
+            early = self._early.peek(felt, felt)
+        return self._length(self.peek_martensite(temperature, tension), early, tension)
 
     def commit(self, temperature: float, tension: float) -> float:
         """Bring the wire there, memory included, and return its elongation [m]."""
-        self._martensite = self._grains.commit(temperature - self._shift * tension)
-        early = 1.0 if self._early is None else self._early.commit(
-            temperature - self._early_shift * tension)
+        self._martensite = self._grains.commit(temperature - self._shift * tension,
+                                               temperature - self._cooling_shift * tension)
+        early = 1.0
+        if self._early is not None:
+            felt = temperature - self._early_shift * tension
+            early = self._early.commit(felt, felt)
         return self._length(self._martensite, early, tension)
 
     def tension(self, temperature: float, elongation: float, guess: float = 1.0) -> float:
