@@ -20,7 +20,9 @@ from .branch import Branch
 # Parameters beyond are refused, so that no product of two can overflow.
 LARGEST = 1e100
 # Differences of the output below this share of full scale are rounding, not a request.
-RESOLUTION = 1e-13
+_RESOLUTION = 1e-13
+# So are those below a few units in the last place, where a constant hides a small full scale.
+_LAST_PLACES = 8.0 * float(np.finfo(float).eps)
 
 
 class Inversion(NamedTuple):
@@ -281,6 +283,12 @@ def memory(state: Mapping[str, Any], operator: HysteresisOperator) -> tuple[floa
     if not isinstance(saturated, bool):
         raise ParameterError(f'{where}: saturated is {saturated!r}, not true or false')
     return u, saturated, where
+
+
+def resolution(ends: tuple[float, float]) -> float:
+    """Return the difference of outputs that counts as rounding, given the output range."""
+    low, high = ends
+    return _RESOLUTION * (high - low) + _LAST_PLACES * max(abs(low), abs(high))
 
 
 def input_range(lower: Any, upper: Any, where: str) -> tuple[float, float]:

@@ -24,8 +24,8 @@ import numpy as np
 from scipy.special import hyp2f1, poch, psi
 
 from .base import (
-    HysteresisOperator, LARGEST, RESOLUTION, input_range, memory, number, one_sign,
-    take)
+    HysteresisOperator, LARGEST, input_range, memory, number, one_sign,
+    resolution, take)
 from .branch import Branch
 from ..errors import ParameterError
 
@@ -92,7 +92,7 @@ class BoucWen(HysteresisOperator):
             raise ParameterError(f'{where}: the output reaches beyond {LARGEST:g}, use another '
                                  'unit')
         self._ends = min(ends), max(ends)
-        self._tolerance = RESOLUTION * (self._ends[1] - self._ends[0])
+        self._tolerance = resolution(self._ends)
 
     def reset(self) -> None:
         """Forget the history: the input came down to `lower` from far above, w = -1."""

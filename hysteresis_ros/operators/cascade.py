@@ -13,13 +13,13 @@ from typing import Sequence
 
 import numpy as np
 
-from .base import HysteresisOperator, Inversion
+from .base import HysteresisOperator, Inversion, resolution
 from .coupled import Coupled
 from .linear import Linear
 from ..errors import ParameterError
 
-# A stage that misses its target by more than this share of its range is not exact.
-_EXACT = 1e-11
+# A stage that misses its target by more than this many times the rounding is not exact.
+_EXACT = 10.0
 
 
 class Cascade(Coupled):
@@ -44,8 +44,7 @@ class Cascade(Coupled):
         super().__init__(stages)
         if not self.stages:
             raise ParameterError('cascade model: no stages given, at least one is needed')
-        self._slack = [_EXACT * (high - low) for low, high in
-                       (stage.output_range for stage in self.stages)]
+        self._slack = [_EXACT * resolution(stage.output_range) for stage in self.stages]
 
     @property
     def output(self) -> float:

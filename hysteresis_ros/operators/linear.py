@@ -8,8 +8,8 @@ from typing import Any, Mapping
 import numpy as np
 
 from .base import (
-    HysteresisOperator, LARGEST, RESOLUTION, input_range, memory, number, sequence,
-    take)
+    HysteresisOperator, LARGEST, input_range, memory, number, resolution,
+    sequence, take)
 from .branch import PiecewiseQuadratic
 from ..errors import ParameterError
 
@@ -45,7 +45,7 @@ class Linear(HysteresisOperator):
             raise ParameterError(
                 f'linear operator: the output reaches beyond {LARGEST:g}, use another unit')
         self._ends = min(ends), max(ends)
-        self._tolerance = RESOLUTION * (self._ends[1] - self._ends[0])
+        self._tolerance = resolution(self._ends)
         self.reset()
 
     def _at(self, u: float) -> float:

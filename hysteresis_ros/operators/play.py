@@ -16,8 +16,8 @@ from typing import Any, Mapping, Sequence
 import numpy as np
 
 from .base import (
-    HysteresisOperator, LARGEST, RESOLUTION, input_range, memory, number, numbers,
-    one_sign, sequence, take)
+    HysteresisOperator, LARGEST, input_range, memory, number, numbers,
+    one_sign, resolution, sequence, take)
 from .branch import PiecewiseQuadratic
 from .staircase import monotone_runs
 from ..errors import ParameterError
@@ -93,7 +93,7 @@ class PrandtlIshlinskii(HysteresisOperator):
             raise ParameterError(f'{where}: the output reaches beyond {LARGEST:g}, use another '
                                  'unit')
         self._ends = min(ends), max(ends)
-        self._tolerance = RESOLUTION * (self._ends[1] - self._ends[0])
+        self._tolerance = resolution(self._ends)
 
     def _limits(self) -> tuple[float, float]:
         """Return the outputs at both ends of the input range."""

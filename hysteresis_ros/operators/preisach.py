@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import ParameterError
 from .areas import signed_areas
 from .base import (
-    HysteresisOperator, LARGEST, RESOLUTION, memory, number, numbers, one_sign,
+    HysteresisOperator, LARGEST, memory, number, numbers, one_sign, resolution,
     sequence, take)
 from .branch import PiecewiseQuadratic
 from .everett import Everett, check_nodes
@@ -81,7 +81,7 @@ class Preisach(HysteresisOperator):
         if not self._span + abs(self._base) <= LARGEST:
             raise ParameterError(
                 f'Preisach operator: the output reaches beyond {LARGEST:g}, use another unit')
-        self._tolerance = RESOLUTION * self._span
+        self._tolerance = resolution(self.output_range)
         for array in (self.nodes, self.weights, self.reversible):
             array.flags.writeable = False
         self.reset()
