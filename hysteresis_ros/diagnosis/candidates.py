@@ -3,12 +3,14 @@
 """Which effects a recording can show at all, and how well each of them explains it."""
 
 import dataclasses
+import itertools
 import math
 
 import joblib
 import numpy as np
 
 from hysteresis_ros.diagnosis.fit import Fit
+from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue
 
 
@@ -78,7 +80,7 @@ def possible(problem, known) -> tuple[list[str], dict[str, str]]:
     return names, hopeless
 
 
-def consider(fitter, known, current: Fit, name: str, replaced: tuple = ()) -> Candidate | None:
+def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
     """
     Fit and cross-validate one effect.
 
@@ -92,8 +94,6 @@ def consider(fitter, known, current: Fit, name: str, replaced: tuple = ()) -> Ca
         The fit with them, cross-validated.
     name : str
         The effect to try.
-    replaced : tuple of str
-        Known effects that the new one contains, which are left out.
 
     Returns
     -------
@@ -124,3 +124,28 @@ def consider_all(fitter, known, current: Fit, names, jobs: int, progress) -> lis
         if candidate is not None and math.isfinite(candidate.rmse):
             found.append(candidate)
     return sorted(found, key=lambda candidate: candidate.rmse)
+
+
+def _consider_set(fitter, effects) -> Fit | None:
+    """Fit some effects together, from usual values and from those that each had alone."""
+    problem = fitter.problem
+    usual = []
+    for effect in effects:
+        starts = starts_of(effect, problem.kind)
+        usual.append(starts[len(starts) // 2])
+    with np.errstate(all='ignore'):
+        fits = [fitter.fit(problem.model.effects, start) for start in (usual, effects)]
+        best = min(fits, key=lambda fit: fitter.error(fit.predicted))
+        best = fitter.cross_validate(problem.model.effects, best)
+    finite = np.all(np.isfinite(best.held_out)) and np.all(np.isfinite(best.jacobian))
+    return best if finite else None
+
+
+def consider_sets(fitter, effects, most: int, jobs: int, progress) -> list[Fit]:
+    """Fit and cross-validate every set of at most `most` of the effects, in parallel."""
+    sets = [subset for size in range(1, most + 1)
+            for subset in itertools.combinations(effects, size)
+            if not any(other.id in effect.replaces for effect in subset for other in subset)]
+    parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
+    tasks = (joblib.delayed(_consider_set)(fitter, list(subset)) for subset in sets)
+    return [fit for fit in progress(parallel(tasks), len(sets)) if fit is not None]

@@ -13,7 +13,8 @@ import dataclasses
 import numpy as np
 
 from hysteresis_ros.diagnosis import leftover, significance, structure
-from hysteresis_ros.diagnosis.candidates import Candidate, consider, consider_all, possible
+from hysteresis_ros.diagnosis.candidates import (
+    Candidate, consider_all, consider_sets, possible)
 from hysteresis_ros.diagnosis.fit import Fitter
 from hysteresis_ros.diagnosis.problem import problem_for
 from hysteresis_ros.effects import catalogue
@@ -24,6 +25,10 @@ PRACTICAL = 0.05
 # Share of blocks in which an effect has to help.
 CONSISTENT = 0.55
 MOST_EFFECTS = 3
+# First effects from which sets are grown.
+MOST_SEEDS = 3
+# Effects of which all sets are tried on the bench.
+MOST_IN_SETS = 5
 # Effects whose signatures agree more than this cannot be told apart.
 CONFUSED = 0.9
 # The base model's error on the arm may be this many times that of the bench's verification.
@@ -148,28 +153,72 @@ class _Diagnostician:
         problem = self.problem
         self._draw_structure()
         names, hopeless = possible(problem, [])
-        first = rivals = consider_all(
+        first = consider_all(
             self.fitter, [], self.current, names, self.jobs, self.progress)
         self._test(first, self.current)
-        rivals_of = {}
-        while len(self.known) < MOST_EFFECTS:
-            chosen = self._choose(rivals)
-            if chosen is None:
-                break
-            self.known = chosen.fit.effects
-            self.current = chosen.fit
-            rivals_of[chosen.id] = rivals
-            self._drop()
-            if self._good_enough() or len(self.known) == MOST_EFFECTS:
-                break
-            again = [name for name in self._worth_another_look(first)
-                     if name not in {effect.id for effect in self.known}]
-            rivals = consider_all(self.fitter, self.known, self.current, again, self.jobs,
-                                  self.progress)
-            self._test(rivals, self.current)
-        if len(self.known) > 1:
-            self._exchange(first)
+        # An effect that is fitted alone may need impossible values to stand in for two, so sets
+        # are grown from the best plausible one and from the best of all.
+        if problem.refits:
+            sets = consider_sets(self.fitter, self._few(first), MOST_EFFECTS, self.jobs,
+                                 self.progress)
+            sets = [fit for fit in sets if not fit.implausible() and self._helps(fit)]
+        else:
+            sets = [self._grow(seed, first) for seed in self._seeds(first)]
+            sets = [found for found in sets if found is not None]
+        if sets:
+            best = min(self.fitter.error(fit.held_out) for fit in sets)
+            enough = [fit for fit in sets
+                      if self.fitter.error(fit.held_out) <= (1.0 + PRACTICAL) * best]
+            fewest = min(len(fit.effects) for fit in enough)
+            self.current = min((fit for fit in enough if len(fit.effects) == fewest),
+                               key=lambda fit: self.fitter.error(fit.held_out))
+            self.known = self.current.effects
+            if not problem.refits:
+                self._drop()
         return self._sum_up(first, hopeless)
+
+    def _seeds(self, first):
+        """Best significant effect that is plausible, and those that fit clearly better."""
+        significant = [candidate for candidate in first
+                       if self._significant(candidate, self.current)]
+        plausible = [candidate for candidate in significant if not candidate.implausible]
+        seeds = plausible[:1]
+        limit = (1.0 - PRACTICAL) * plausible[0].rmse if plausible else np.inf
+        better = [candidate for candidate in significant
+                  if candidate.implausible and candidate.rmse < limit]
+        return seeds + better[:MOST_SEEDS - len(seeds)]
+
+    def _few(self, first):
+        """Effects of which sets are made on the bench: those that help by themselves."""
+        return [candidate.effect for candidate in first
+                if candidate.p_value <= SIGNIFICANCE
+                and candidate.rmse < (1.0 - PRACTICAL) * self.before][:MOST_IN_SETS]
+
+    def _helps(self, fit) -> bool:
+        """Whether a set of effects explains more than chance, of mostly one sign."""
+        problem = self.problem
+        gains = significance.block_sums(
+            (problem.measured - self.base.held_out) ** 2
+            - (problem.measured - fit.held_out) ** 2, problem.block)
+        p_value = significance.paired_p_values(gains[None, :], self.rng)[0]
+        return bool(p_value <= SIGNIFICANCE and np.mean(gains > 0.0) >= CONSISTENT)
+
+    def _grow(self, seed: Candidate, first):
+        """Add effects to a first one while each explains more; None if it ends implausible."""
+        fit = seed.fit
+        while len(fit.effects) < MOST_EFFECTS and self.fitter.error(fit.held_out) > self.floor:
+            known = fit.effects
+            taken = {effect.id for effect in known}
+            names = [name for name in self._worth_another_look(first, fit) if name not in taken]
+            rivals = consider_all(self.fitter, known, fit, names, self.jobs, self.progress)
+            self._test(rivals, fit)
+            rivals = [rival for rival in rivals if self._significant(rival, fit)]
+            plausible = [rival for rival in rivals if not rival.fit.implausible()]
+            chosen = (plausible or (rivals if fit.implausible() else []))[:1]
+            if not chosen:
+                break
+            fit = chosen[0].fit
+        return None if fit.implausible() else fit
 
     def _draw_structure(self):
         problem = self.problem
@@ -186,15 +235,16 @@ class _Diagnostician:
         """What sensor and base model leave by themselves."""
         return float(np.hypot(self.structure, self.problem.noise))
 
-    def _worth_another_look(self, first):
+    def _worth_another_look(self, first, fit):
         """Effects that have anything to say about what is left, judged by their signatures."""
-        left = self.problem.measured - self.current.predicted
-        columns = self.current.jacobian
+        left = self.problem.measured - fit.predicted
+        limit = (1.0 - PRACTICAL) * float(np.mean(left ** 2))
         worth = []
         for candidate in first:
-            both = np.column_stack([columns, candidate.fit.jacobian, candidate.signature])
-            error = significance.held_out_errors(both, left[None, :], self.problem.fold)[0]
-            if error < (1.0 - PRACTICAL) * np.mean(left ** 2):
+            columns = np.column_stack(
+                [fit.jacobian, candidate.fit.jacobian, candidate.signature])
+            if self.problem.refits or significance.held_out_errors(
+                    columns, left[None, :], self.problem.fold)[0] < limit:
                 worth.append(candidate.id)
         return worth
 
@@ -236,16 +286,6 @@ class _Diagnostician:
             (measured - current.held_out) ** 2 - (measured - candidate.fit.held_out) ** 2, block)
         return bool(np.mean(gains > 0.0) >= CONSISTENT)
 
-    def _choose(self, candidates) -> Candidate | None:
-        """Best significant effect; a plausible one goes before any that is not."""
-        significant = [candidate for candidate in candidates
-                       if self._significant(candidate, self.current)]
-        plausible = [candidate for candidate in significant if not candidate.implausible]
-        return plausible[0] if plausible else None
-
-    def _good_enough(self) -> bool:
-        return self.fitter.error(self.current.held_out) <= self.floor
-
     def _drop(self) -> None:
         """Take out effects that a later one has made needless."""
         for effect in self.known[:-1]:
@@ -255,20 +295,6 @@ class _Diagnostician:
             if self.fitter.error(without.held_out) <= limit:
                 self.known, self.current = without.effects, without
                 return
-
-    def _exchange(self, first) -> None:
-        """Try for every effect of a set whether another does better in its place."""
-        for position in range(len(self.known)):
-            others = [effect for index, effect in enumerate(self.known) if index != position]
-            taken = {effect.id for effect in self.known}
-            names = [candidate.id for candidate in first if candidate.id not in taken][:RIVALS]
-            without = self._refit(others)
-            rivals = consider_all(self.fitter, others, without, names, self.jobs, self.progress)
-            better = [candidate for candidate in rivals if not candidate.implausible
-                      and candidate.rmse < (1.0 - PRACTICAL) * self.fitter.error(
-                          self.current.held_out)]
-            if better:
-                self.known, self.current = better[0].fit.effects, better[0].fit
 
     def _alternatives(self, first) -> list:
         """For each missing effect, those that could as well be the truth in its place."""
@@ -415,5 +441,3 @@ class _Diagnostician:
             return f'to see {name}, too: {effects[name].experiment}'
         return 'nothing: the model explains this recording'
 
-
-__all__ = ['Diagnosis', 'consider', 'diagnose']

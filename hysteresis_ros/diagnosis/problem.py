@@ -15,18 +15,21 @@ import numpy as np
 from hysteresis_ros.diagnosis.structure import Offset
 from hysteresis_ros.effects import SensorEffect
 from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.identification.least_squares import fit_weights
+from hysteresis_ros.identification.least_squares import fit_weights, quick_weights
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.simulation import Simulator, turning_rows
 from hysteresis_ros.operators import Preisach, cell_areas, signed_areas
 
-# A continuous run is judged on about this many rows; between them nothing new is learned.
-MOST_ROWS = 1500
+# A long recording is judged on about this many rows; between them nothing new is learned. Weights
+# that are refitted again and again ask for fewer.
+MOST_ROWS = {'arm': 1500, 'bench': 400}
 MOST_FOLDS = 4
 # Blocks for significance: about this many a recording.
 BLOCKS = 24
 # Strengths of the weights' regularisation that are tried when weights are refitted.
-STRENGTHS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+STRENGTHS = (1e-6, 1e-5, 1e-4, 1e-3)
+# And the one at which sets of effects are compared; a wrong base would ask for too much of it.
+SEARCH_STRENGTH = 1e-4
 
 
 def sensor_resolution(measurement) -> float:
@@ -59,7 +62,7 @@ class Problem:
         self.response = measurements[0].response
         self.settled = all(m.settled for m in measurements)
         rows = sum(m.rows for m in measurements)
-        self.stride = max(1, rows // MOST_ROWS)
+        self.stride = max(1, rows // MOST_ROWS[self.kind])
         self.simulators = [Simulator(model, m, self.stride) for m in measurements]
         self.chosen = [np.arange(0, m.rows, self.stride) for m in measurements]
         self.measured = self.pick([m.column(m.response) for m in measurements])
@@ -196,7 +199,7 @@ class BenchProblem(Problem):
                                    f'model has a {stage.kind} one; identify it with --operator '
                                    'two-stage or preisach')
         self.levels = len(stage.nodes) - 1
-        self._strength = None
+        self._passive = None
 
     def _design(self, effects) -> Design:
         model = self.model
@@ -269,10 +272,13 @@ class BenchProblem(Problem):
 
     def simulate(self, effects, train=None) -> np.ndarray:
         """Return the response of the judged rows, shape (n,), weights fitted to `train` (n,)."""
-        if self._strength is None:
-            self._strength = self.fit_stage(self.model.effects)[0].strength
-        fit, design = self.fit_stage(effects, train, self._strength)
-        response = fit.predict(design.rows) + design.known
+        design = self._design(effects)
+        rows = slice(None) if train is None else train
+        # Neighbouring parameters have neighbouring weights.
+        weights, bias, self._passive = quick_weights(
+            design.rows[rows], (self.measured - design.known)[rows],
+            2.0 * cell_areas(design.nodes), SEARCH_STRENGTH, self._passive)
+        response = design.rows @ weights + bias + design.known
         for effect in effects:
             if isinstance(effect, SensorEffect):
                 response = self._sensed(effect, response)

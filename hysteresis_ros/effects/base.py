@@ -13,6 +13,7 @@ a controller can undo it. Effects with dynamics or memory of their own carry it 
 """
 
 import abc
+from collections.abc import Mapping
 import dataclasses
 import math
 from typing import ClassVar, NamedTuple
@@ -47,6 +48,8 @@ class Parameter:
         For a parameter that is tried at these values instead of being fitted.
     kinds : tuple of str
         Kinds of measurement, 'arm' or 'bench', on which it is fitted; else it keeps its value.
+    limits : (float, float), optional
+        What the value cannot pass by its nature; default the range widened.
     """
 
     name: str
@@ -60,12 +63,15 @@ class Parameter:
     both_signs: bool = False
     choices: tuple = ()
     kinds: tuple = ('arm', 'bench')
+    limits: tuple | None = None
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Limits for a fit: the range widened, so that an implausible value can show itself."""
         if self.choices:
             return min(self.choices), max(self.choices)
+        if self.limits is not None:
+            return self.limits
         if self.log:
             return self.low / 5.0, self.high * 5.0
         if self.both_signs:
@@ -105,7 +111,9 @@ class Surroundings(NamedTuple):
 
     `length` is the muscle's resting length in the response's unit (1 for a strain), `load` the
     mean load of the bench, `heat` the largest heat seen there (drive squared where the drive heats
-    a wire), `span` the response's range, `drive`, `load_name` and `response` what they are.
+    a wire), `span` the response's range, `drive`, `load_name` and `response` what they are. `cold`
+    is the drive that every trial starts from, `drive_range` the width of the range seen, and `sign`
+    is -1 for a muscle that gets shorter when driven, 1 for one that gets longer.
     """
 
     length: float
@@ -115,11 +123,18 @@ class Surroundings(NamedTuple):
     drive: str = 'voltage'
     load_name: str | None = 'force'
     response: str = 'length'
+    cold: float = 0.0
+    drive_range: float = 1.0
+    sign: int = -1
 
 
 class Effect(abc.ABC):
     """
     One physical effect with its parameter values.
+
+    A class says what it is in its attributes: `id`, `stage`, one physical `sentence`, `equation`,
+    `source`, the signal that it `shows_in`, the `experiment` that excites it, and the effects that
+    it is easily `confused_with`.
 
     Parameters
     ----------
@@ -155,7 +170,10 @@ class Effect(abc.ABC):
     needs_phase: ClassVar[bool] = False
     # A recorded column without which the effect cannot be told.
     needs_column: ClassVar[str | None] = None
+    # Whether a controller undoes it.
     invertible: ClassVar[bool] = True
+    # Names of the attributes that hold what it remembers of the past; `start` sets them.
+    memory: ClassVar[tuple] = ()
 
     def __init__(self, surroundings: Surroundings | None = None, **values: float):
         self.parameters = self.describe(surroundings)
@@ -169,6 +187,7 @@ class Effect(abc.ABC):
         self.values = {parameter.name: float(values.get(parameter.name, parameter.neutral))
                        for parameter in self.parameters}
         self.intervals: dict[str, tuple[float, float]] = {}
+        self.start()
 
     def __getattr__(self, name: str) -> float:
         """Read a parameter's value as an attribute, so that equations stay readable."""
@@ -182,8 +201,34 @@ class Effect(abc.ABC):
         """Return the parameters with the units and ranges that suit the muscle."""
         return cls.parameters
 
+    def start(self) -> None:
+        """Forget the past: a trial starts, from the cold muscle at rest."""
+
+    def save(self) -> dict:
+        """Return what it remembers of the past, as plain types."""
+        return {name: getattr(self, name) for name in self.memory}
+
+    def restore(self, state: Mapping) -> None:
+        """
+        Take back what `save` returned.
+
+        Raises
+        ------
+        KeyError
+            If a part of it is missing.
+        """
+        for name in self.memory:
+            setattr(self, name, state[name])
+
     def with_values(self, **values: float) -> 'Effect':
-        """Return a copy with some values changed."""
+        """
+        Return a copy with some values changed, without intervals and without a past.
+
+        Raises
+        ------
+        ParameterError
+            For a name it does not have or a value that is not finite.
+        """
         copy = type(self)(**{**self.values, **values})
         copy.parameters = self.parameters
         return copy
@@ -213,57 +258,114 @@ class DriveEffect(Effect):
     Effect between the drive that was set and the steady-state drive that the muscle feels.
 
     An electrical effect maps the drive, a thermal one the heat (the drive squared where it is a
-    voltage or a current, the drive itself where it is a temperature, pressure or power).
+    voltage or a current, the drive itself where it is a temperature, pressure or power). One
+    without a past defines `forward`, one with a past `step` and `start`; the other follows.
     """
 
-    def forward(self, signal, inputs: Inputs, surroundings: Surroundings):
-        """Map the signal of one trial, shape (rows,); stateless ones take scalars as well."""
-        self.start()
-        steps = np.broadcast_to(inputs.step, np.shape(signal))
-        phases = np.broadcast_to(inputs.phase, np.shape(signal))
-        return np.array([
-            self.step(float(value), float(step), float(phase), surroundings)
-            for value, step, phase in zip(signal, steps, phases)])
+    # Heat exchange with the air over that of the bench, which every lag of the model follows.
+    exchange: float = 1.0
 
-    def start(self) -> None:
-        """Forget the past: the muscle is cold and at rest."""
+    def forward(self, signal, inputs: Inputs, surroundings: Surroundings):
+        """
+        Map the signal of one trial.
+
+        Parameters
+        ----------
+        signal : ndarray, shape (rows,)
+            Drive or heat; an effect without a past takes a scalar as well.
+        inputs : Inputs
+            Of the same shape.
+        surroundings : Surroundings
+            The muscle.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+        """
+        self.start()
+        steps = np.broadcast_to(inputs.step, np.shape(signal)).tolist()
+        phases = np.broadcast_to(inputs.phase, np.shape(signal)).tolist()
+        return np.array([self.step(value, step, phase, surroundings)
+                         for value, step, phase in zip(signal.tolist(), steps, phases)])
 
     def step(self, value: float, step: float, phase: float,
              surroundings: Surroundings) -> float:
-        """Advance by `step` [s] under the constant input `value`."""
+        """Advance by `step` [s] under the constant input `value`; `phase` as in `Inputs`."""
         inputs = Inputs(0.0, 0.0, step, math.nan, phase, 0.0)
         return float(self.forward(value, inputs, surroundings))
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
-        """Return the input for which the output becomes `signal`; identity if not possible."""
+        """
+        Return the input for which the output becomes `signal`; identity if not possible.
+
+        For an effect with a past: the input that, held for ``inputs.step`` seconds, brings the
+        output there.
+        """
         return signal
 
 
 class MaterialEffect(Effect):
     """
-    Effect on the muscle's relation ``L = L0 + S(F) (H2[s (x - c F)] - L0) + e(F) + o``.
+    Effect on the muscle's relation ``L = L0 + S(F) f (H2[s (x - c F)] - L0) + e(F) + o``.
 
     The transformation is H2 of the drive x shifted by the load F; S scales its strain, e is what
-    the load alone stretches, and o is what time does. Each method has a neutral default.
+    the load alone stretches, f and o are what time and use do. Each method has a neutral default.
+    Loads are per muscle, scalars or arrays.
     """
 
     stage = 'material'
+    # Load per heat that takes the place of the first stage; 0 leaves it as it is.
+    load_per_heat: float = 0.0
+    # Excess length [m] of each parallel muscle.
+    offsets: tuple = (0.0,)
 
     def shift_load(self, load, surroundings: Surroundings):
         """Return what is added to the load inside the transformation, in units of the load."""
         return 0.0 * load
 
     def scale(self, load, surroundings: Surroundings):
-        """Return the factor on the transformation strain under `load`."""
+        """Return S, the factor on the transformation strain under `load`."""
         return 1.0 + 0.0 * load
 
     def stretch(self, load, surroundings: Surroundings):
-        """Return the elongation under `load` that does not depend on the transformation."""
+        """Return e, the elongation under `load` that does not depend on the transformation."""
         return 0.0 * load
 
     def drift(self, drive, heat, inputs: Inputs, surroundings: Surroundings):
-        """Return offset and factor per row, each shape (rows,), that time and history add."""
-        return np.zeros(len(drive)), np.ones(len(drive))
+        """
+        Return what time and history add in one trial.
+
+        Parameters
+        ----------
+        drive, heat : ndarray, shape (rows,)
+            The drive that was set and the heat that the muscle feels.
+        inputs : Inputs
+            Of the same shape.
+        surroundings : Surroundings
+            The muscle.
+
+        Returns
+        -------
+        offset, factor : ndarray, shape (rows,)
+            o in the response's unit, and f.
+        """
+        if type(self).advance is MaterialEffect.advance:
+            return np.zeros(len(drive)), np.ones(len(drive))
+        self.start()
+        columns = [np.broadcast_to(column, np.shape(drive)).tolist()
+                   for column in (drive, heat, *inputs)]
+        added = [self.advance(value, felt, Inputs(*row), surroundings)
+                 for value, felt, *row in zip(*columns)]
+        return tuple(np.array(added, dtype=float).reshape(-1, 2).T)
+
+    def advance(self, drive: float, heat: float, inputs: Inputs,
+                surroundings: Surroundings) -> tuple[float, float]:
+        """Return `drift` of the next row; an effect with a past defines this and `start`."""
+        if type(self).drift is MaterialEffect.drift:
+            return 0.0, 1.0
+        offset, factor = self.drift(np.array([drive]), np.array([heat]),
+                                    Inputs(*(np.array([value]) for value in inputs)), surroundings)
+        return float(offset[0]), float(factor[0])
 
 
 @dataclasses.dataclass
@@ -271,14 +373,22 @@ class Statics:
     """
     The arm at rest on a grid of angles: what the linkage asks of each muscle.
 
-    All arrays have shape (n,): `theta` [rad], elongation `length` [m], `moment_arm` [m], and the
-    total `moment` [N m] that the muscles have to hold.
+    All arrays have shape (n,): `theta` [rad], elongation `length` [m], `moment_arm` [m], the
+    total `moment` [N m] that the muscles have to hold, and `upright` [rad], the angle between the
+    forearm and what really is upwards, along which weights pull.
     """
 
     theta: np.ndarray
     length: np.ndarray
     moment_arm: np.ndarray
     moment: np.ndarray
+    upright: np.ndarray
+
+    @classmethod
+    def of(cls, geometry, theta: np.ndarray) -> 'Statics':
+        """Return the arm that the geometry describes, without any effect."""
+        return cls(theta, geometry.length(theta), geometry.moment_arm(theta),
+                   geometry.load_moment(theta), theta)
 
 
 class MechanismEffect(Effect):
@@ -290,28 +400,43 @@ class MechanismEffect(Effect):
         """Return the arm at rest with the effect; by default unchanged."""
         return statics
 
-    # Moments that resist motion: Coulomb [N m], viscous [N m s/rad], inertia [kg m^2].
     def resistance(self) -> tuple[float, float, float]:
-        """Return Coulomb moment, viscous coefficient and moment of inertia."""
+        """
+        Return what resists motion.
+
+        Returns
+        -------
+        tuple of float
+            Coulomb moment [N m], viscous coefficient [N m s/rad], moment of inertia [kg m^2].
+        """
         return 0.0, 0.0, 0.0
 
 
 class SensorEffect(Effect):
-    """Effect between the true response and the measured one."""
+    """
+    Effect between the true response and the measured one.
+
+    One without a past defines `forward` or `step`, one with a past `step` and `start`.
+    """
 
     stage = 'sensor'
     kinds = ('arm', 'bench')
 
     def forward(self, response, inputs: Inputs):
         """Map the response of one trial, shape (rows,)."""
-        return response
-
-    def start(self) -> None:
-        """Forget the past."""
+        if type(self).step is SensorEffect.step:
+            return response
+        self.start()
+        steps = np.broadcast_to(inputs.step, np.shape(response)).tolist()
+        return np.array([self.step(value, step)
+                         for value, step in zip(response.tolist(), steps)])
 
     def step(self, value: float, step: float) -> float:
         """Advance by one sample taken `step` seconds after the one before."""
-        return value
+        if type(self).forward is SensorEffect.forward:
+            return value
+        inputs = Inputs(*(np.array([entry]) for entry in (0., 0., step, math.nan, math.nan, 0.)))
+        return float(self.forward(np.array([value]), inputs)[0])
 
     def inverse(self, response: float) -> float:
         """Return the true response that is measured as `response`."""

@@ -7,10 +7,15 @@ import inspect
 from importlib import metadata
 
 from hysteresis_ros.effects import electrical, material, mechanism, sensor, thermal
-from hysteresis_ros.effects.base import STAGES, Effect
+from hysteresis_ros.effects.base import (
+    STAGES, DriveEffect, Effect, MaterialEffect, MechanismEffect, SensorEffect)
 from hysteresis_ros.errors import ParameterError
 
 ENTRY_POINT_GROUP = 'hysteresis_ros.effects'
+
+BASES = {'electrical': DriveEffect, 'thermal': DriveEffect, 'material': MaterialEffect,
+         'mechanism': MechanismEffect, 'sensor': SensorEffect}
+DESCRIPTION = ('id', 'stage', 'sentence', 'equation', 'source', 'shows_in', 'experiment')
 
 
 def _own() -> list[type[Effect]]:
@@ -34,8 +39,26 @@ def _installed() -> list[type[Effect]]:
         if not (inspect.isclass(effect) and issubclass(effect, Effect)):
             raise ParameterError(
                 f'entry point {entry.value!r} is no subclass of hysteresis_ros.effects.Effect')
+        _check(effect)
         found.append(effect)
     return found
+
+
+def _check(effect: type[Effect]) -> None:
+    """Refuse a user's effect that would be without effect."""
+    name = getattr(effect, 'id', effect.__name__)
+    missing = [part for part in DESCRIPTION if not isinstance(getattr(effect, part, None), str)]
+    if missing:
+        raise ParameterError(f'effect {name} lacks {", ".join(missing)}; give them as text')
+    if effect.stage not in STAGES:
+        raise ParameterError(
+            f'effect {name}: stage {effect.stage!r} is none of {", ".join(STAGES)}')
+    base = BASES[effect.stage]
+    if not issubclass(effect, base):
+        raise ParameterError(
+            f'effect {name}: one of stage {effect.stage} has to be a {base.__name__}')
+    if base is DriveEffect and (effect.forward is base.forward and effect.step is base.step):
+        raise ParameterError(f'effect {name} defines neither forward nor step')
 
 
 @functools.cache
@@ -46,14 +69,11 @@ def catalogue() -> dict[str, type[Effect]]:
     Raises
     ------
     ParameterError
-        If an installed effect cannot be loaded, is of an unknown stage, or takes a name that is
-        already there.
+        If an installed effect cannot be loaded, does not say what it is, does not fit its stage,
+        or takes a name that is already there.
     """
     effects: dict[str, type[Effect]] = {}
     for effect in _own() + _installed():
-        if effect.stage not in STAGES:
-            raise ParameterError(
-                f'effect {effect.id}: stage {effect.stage!r} is none of {", ".join(STAGES)}')
         if effect.id in effects:
             raise ParameterError(f'two effects are called {effect.id!r}; rename one')
         effects[effect.id] = effect

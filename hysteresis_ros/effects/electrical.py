@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects between the voltage that was set and the heat in the wire."""
 
+import math
+
 import numpy as np
 
 from hysteresis_ros.effects.base import DriveEffect, Parameter
@@ -36,6 +38,11 @@ class SupplySag(ElectricalEffect):
 
     WIRE_RESISTANCE = 8.0
 
+    @classmethod
+    def available(cls, surroundings):
+        """Whether the drive is a voltage: a current is the same in supply and wire."""
+        return surroundings.drive == 'voltage'
+
     def forward(self, signal, inputs, surroundings):
         """Divide the voltage between series resistance and wire."""
         return signal * self.WIRE_RESISTANCE / (self.WIRE_RESISTANCE + self.Rs)
@@ -61,14 +68,15 @@ class PwmDeadZone(ElectricalEffect):
 
     def forward(self, signal, inputs, surroundings):
         """Cut the lower end off and stretch the rest."""
-        full = np.sqrt(surroundings.heat)
-        span = max(full - self.Vd, 1e-3 * full)
-        return np.maximum(signal - self.Vd, 0.0) * full / span
+        return np.maximum(signal - self.Vd, 0.0) * self._stretch(surroundings)
 
     def inverse(self, signal, inputs, surroundings):
         """Add the dead zone again; zero stays zero."""
-        full = np.sqrt(surroundings.heat)
-        return signal * (full - self.Vd) / full + self.Vd if signal > 0.0 else 0.0
+        return signal / self._stretch(surroundings) + self.Vd if signal > 0.0 else 0.0
+
+    def _stretch(self, surroundings):
+        full = math.sqrt(surroundings.heat)
+        return full / max(full - self.Vd, 1e-3 * full)
 
 
 class ResistanceChange(ElectricalEffect):
@@ -77,20 +85,26 @@ class ResistanceChange(ElectricalEffect):
     id = 'resistance_change'
     sentence = ("The wire's resistance changes as it transforms, so the same voltage heats the "
                 'two phases differently.')
-    equation = 'heat = V^2 / (1 + eta (xi - 1)), xi the martensite share'
+    equation = ('heat = V^2 (1 + eta) / (1 + eta xi), xi the martensite share: V^2 / R with '
+                'R = R_A (1 + eta xi), the cold wire as on the bench; the inverse for a current')
     source = "the paper's reference [46]: less than 15 % in phase transition"
     shows_in = 'the middle of the loop'
     experiment = 'log the current as well as the voltage'
     confused_with = ('stress_dependence',)
     needs_phase = True
     parameters = (
-        Parameter('eta', '1', 'relative change of resistance from martensite to austenite',
+        Parameter('eta', '1', 'resistance of martensite over that of austenite, less one',
                   0.02, 0.20, 0.0, (-0.1, 0.1), both_signs=True),)
 
     def forward(self, signal, inputs, surroundings):
-        """Return the voltage that heats a wire of constant resistance as much."""
-        return signal / np.sqrt(np.maximum(1.0 + self.eta * (inputs.phase - 1.0), 0.1))
+        """Return the drive that heats a wire of constant resistance as much."""
+        return signal * self._gain(inputs, surroundings)
 
     def inverse(self, signal, inputs, surroundings):
         """Undo the change at the phase that is to be reached."""
-        return signal * float(np.sqrt(max(1.0 + self.eta * (inputs.phase - 1.0), 0.1)))
+        return signal / float(self._gain(inputs, surroundings))
+
+    def _gain(self, inputs, surroundings):
+        cold = max(1.0 + self.eta, 0.1)
+        gain = np.sqrt(cold / np.maximum(1.0 + self.eta * inputs.phase, 0.1))
+        return gain if surroundings.drive == 'voltage' else 1.0 / gain

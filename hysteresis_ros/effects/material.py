@@ -7,6 +7,8 @@ Those of the load (`stress_dependence`, `stress_dependent_strain`, `series_compl
 what a bench measures, so adding them on bench tables refits the weights of H2.
 """
 
+import math
+
 import numpy as np
 
 from hysteresis_ros.effects.base import MaterialEffect, Parameter, Surroundings
@@ -37,10 +39,9 @@ class StressDependence(MaterialEffect):
         """Give C the unit and range of this muscle's load and drive."""
         if surroundings is None:
             surroundings = Surroundings(1.0, 1.0, 1.0, 1.0)
-        unit, low, high = cls.RANGES.get(
-            (surroundings.drive, surroundings.load_name),
-            ('load/heat', 1e-3 * surroundings.load / surroundings.heat,
-             1e3 * surroundings.load / surroundings.heat))
+        scale = (surroundings.load or 1.0) / (surroundings.heat or 1.0)
+        unit, low, high = cls.RANGES.get((surroundings.drive, surroundings.load_name),
+                                         ('load/heat', 1e-3 * scale, 1e3 * scale))
         starts = tuple(float(value) for value in np.geomspace(low, high, 5)[1:-1])
         return (Parameter('C', unit, 'load that shifts the transformation by one unit of heat',
                           low, high, 0.0, starts, log=True, kinds=('bench',)), cls.SHIFT)
@@ -75,7 +76,7 @@ class StressDependentStrain(MaterialEffect):
     kinds = ('arm', 'bench')
     parameters = (
         Parameter('r', '1', 'share of the strain that is missing without load', 0.02, 1.0, 0.0,
-                  (0.3, 0.8)),
+                  (0.3, 0.8), limits=(0.0, 1.0)),
         Parameter('F0', 'loads', "load scale of the saturation over the bench's mean load",
                   0.1, 3.0, 1.0, (0.5, 1.5), log=True),)
 
@@ -83,7 +84,8 @@ class StressDependentStrain(MaterialEffect):
         """Grow with the load, one at the bench's mean load."""
         scale = self.F0 * surroundings.load
         share = 1.0 - self.r * np.exp(-np.maximum(load, 0.0) / scale)
-        return share / max(1.0 - self.r * np.exp(-1.0 / self.F0), 1e-3)
+        # A stroke of nothing could not be inverted.
+        return np.maximum(share, 0.02) / max(1.0 - self.r * math.exp(-1.0 / self.F0), 0.02)
 
     @classmethod
     def available(cls, surroundings):
@@ -106,15 +108,23 @@ class SeriesCompliance(MaterialEffect):
         Parameter('compliance', 'mm/N', 'elongation per load', 0.005, 0.5, 0.0, (0.02, 0.1),
                   log=True),)
 
-    UNITS = {'mm/N': 1e-3, '1/GPa': 1e-9}
+    UNITS = {'mm/N': 1e-3, '1/GPa': 1e-9, '%/N': 1e-2, 'mm/MPa': 1e-9}
+    # The same wire of 0.27 m and 0.2 mm in the units of other tables.
+    RANGES = {('strain', 'stress'): ('1/GPa', 'strain per stress', 0.004, 0.3),
+              ('strain', 'force'): ('%/N', 'strain per load', 0.002, 0.2),
+              ('length', 'stress'): ('mm/MPa', 'elongation per stress', 0.0002, 0.02)}
 
     @classmethod
     def describe(cls, surroundings):
         """Give the compliance the unit of this muscle's response and load."""
-        if surroundings is None or surroundings.load_name == 'force':
+        if surroundings is None:
             return cls.parameters
-        return (Parameter('compliance', '1/GPa', 'strain per stress', 0.004, 0.3, 0.0, (0.02, 0.1),
-                          log=True),)
+        kind = surroundings.response, surroundings.load_name
+        if kind not in cls.RANGES:
+            return cls.parameters
+        unit, meaning, low, high = cls.RANGES[kind]
+        starts = float(np.sqrt(low * high)), 0.3 * high
+        return (Parameter('compliance', unit, meaning, low, high, 0.0, starts, log=True),)
 
     def stretch(self, load, surroundings):
         """Return the elastic elongation beyond that at the bench's mean load."""
@@ -132,7 +142,7 @@ class RPhase(MaterialEffect):
 
     id = 'r_phase'
     sentence = 'A part of the strain comes early, in a narrow step with little hysteresis.'
-    equation = 'L -= p l0 s((q -+ w/2 - q0) / d), s the logistic step, q the heat'
+    equation = 'L -= p l0 s((q -+ w/2 - q0) / d), s the logistic step, q the heat, w = 3 %'
     source = 'R-phase transformation of NiTi: 0.3 to 1 % strain, 2 to 5 K hysteresis'
     shows_in = 'a shoulder on cooling at low load'
     experiment = 'a fine staircase of cooling steps'
@@ -145,19 +155,22 @@ class RPhase(MaterialEffect):
         Parameter('width', '1', 'width d of the step over the largest heat', 0.005, 0.1, 0.03,
                   (0.03,), log=True),)
 
+    memory = ('_played',)
+
+    # Width w of the step's own hysteresis over the largest heat.
     LOOP = 0.03
 
-    def drift(self, drive, heat, inputs, surroundings):
+    def start(self):
+        """Forget the past: cold."""
+        self._played = 0.0
+
+    def advance(self, drive, heat, inputs, surroundings):
         """Return the strain of the step, with a small play as its hysteresis."""
         half = 0.5 * self.LOOP * surroundings.heat
-        played = np.empty(len(heat))
-        state = 0.0
-        for row, value in enumerate(heat.tolist()):
-            state = min(max(state, value - half), value + half)
-            played[row] = state
-        argument = (played / surroundings.heat - self.position) / self.width
-        step = 0.5 * (1.0 + np.tanh(0.5 * argument))
-        return -self.strain / 100.0 * surroundings.length * step, np.ones(len(drive))
+        self._played = min(max(self._played, heat - half), heat + half)
+        argument = (self._played / surroundings.heat - self.position) / self.width
+        step = 0.5 * (1.0 + math.tanh(0.5 * argument))
+        return surroundings.sign * self.strain / 100.0 * surroundings.length * step, 1.0
 
 
 class Creep(MaterialEffect):
@@ -179,26 +192,50 @@ class Creep(MaterialEffect):
         Parameter('t0', 's', 'time from which the logarithm counts', 0.5, 30.0, 3.0, (3.0,),
                   log=True),)
 
+    memory = ('_since', '_drive', '_before', '_direction')
+
     # A change of the drive by less than this share of its range is a hold.
     HOLD = 1e-3
 
-    def drift(self, drive, heat, inputs, surroundings):
-        """Return the strain since each row's last step, in that step's direction."""
-        time = np.asarray(inputs.time, dtype=float)
-        change = np.diff(drive, prepend=drive[:1])
-        full = max(np.ptp(drive), 1e-12)
-        moving = np.abs(change) > self.HOLD * full
-        moving[0] = True
-        rows = np.arange(len(drive))
-        last = np.maximum.accumulate(np.where(moving, rows, 0))
-        since = time - time[last]
+    def start(self):
+        """Forget the past: cold, before the first step."""
+        self._since = None
+        self._drive = self._before = None
+        self._direction = 0.0
+
+    def advance(self, drive, heat, inputs, surroundings):
+        """Return the strain since the last step, in that step's direction."""
         # A ramp is many small steps: what a hold after it shows is the whole ramp's.
-        run = np.cumsum(np.r_[True, np.sign(change[1:]) != np.sign(change[:-1])] & moving)
-        starts = np.maximum.accumulate(np.where(np.diff(run, prepend=-1) > 0, rows, 0))
-        before = np.maximum(starts[last] - 1, 0)
-        size = (drive[last] - drive[before]) / full
-        strain = np.log1p(since / self.t0) * size
-        return -self.c / 100.0 * surroundings.length * strain, np.ones(len(drive))
+        previous = surroundings.cold if self._drive is None else self._drive
+        change = drive - previous
+        direction = 0.0
+        if abs(change) > self.HOLD * surroundings.drive_range:
+            direction = math.copysign(1.0, change)
+        if direction != 0.0:
+            if direction != self._direction:
+                self._before = previous
+            self._since = inputs.time
+        self._direction, self._drive = direction, drive
+        if self._since is None:
+            return 0.0, 1.0
+        size = (drive - self._before) / surroundings.drive_range
+        strain = self.c / 100.0 * size * math.log1p((inputs.time - self._since) / self.t0)
+        return surroundings.sign * surroundings.length * strain, 1.0
+
+    def drift(self, drive, heat, inputs, surroundings):
+        """Return the same for a whole trial at once."""
+        change = np.diff(drive, prepend=surroundings.cold)
+        direction = np.where(
+            np.abs(change) > self.HOLD * surroundings.drive_range, np.sign(change), 0.0)
+        rows = np.arange(len(drive))
+        last = np.maximum.accumulate(np.where(direction != 0.0, rows, -1))
+        turned = (direction != 0.0) & (direction != np.concatenate(([0.0], direction[:-1])))
+        begun = np.maximum.accumulate(np.where(turned, rows, 0))
+        before = np.concatenate(([surroundings.cold], drive))[begun]
+        size = (drive - before) / surroundings.drive_range
+        held = np.where(last >= 0, inputs.time - inputs.time[last], 0.0)
+        strain = self.c / 100.0 * size * np.log1p(held / self.t0)
+        return surroundings.sign * surroundings.length * strain, np.ones(len(drive))
 
 
 class Fatigue(MaterialEffect):
@@ -216,7 +253,7 @@ class Fatigue(MaterialEffect):
         Parameter('b', '% of l0', 'drift per factor e of the number of cycles', 0.0, 0.5, 0.0,
                   (0.05, -0.05), both_signs=True),
         Parameter('a', '1', 'loss of stroke per factor e of the number of cycles', 0.0, 0.3, 0.0,
-                  (0.03,), both_signs=True),)
+                  (0.03,)),)
 
     def drift(self, drive, heat, inputs, surroundings):
         """Return drift and stroke for the cycles counted since the recording began."""
@@ -231,7 +268,7 @@ class Slack(MaterialEffect):
 
     id = 'slack'
     sentence = 'A dead length has to be taken up before the muscle pulls.'
-    equation = "F = max(F, 0), L += Ls exp(-F / Fs), Fs half the bench's mean load"
+    equation = 'L += Ls, F = max(F, 0)'
     source = 'unilateral contact'
     shows_in = 'low force'
     experiment = 'sweep the preload'
@@ -240,8 +277,8 @@ class Slack(MaterialEffect):
         Parameter('Ls', 'mm', 'dead length', 0.1, 5.0, 0.0, (0.5, 2.0), log=True),)
 
     def stretch(self, load, surroundings):
-        """Return the dead length that is still there under `load`."""
-        return 1e-3 * self.Ls * np.ones_like(load)
+        """Return the dead length, the same under any load; that a wire cannot push holds anyway."""
+        return 1e-3 * self.Ls + 0.0 * load
 
 
 class UnequalMuscles(MaterialEffect):

@@ -28,7 +28,6 @@ class CoulombFriction(MechanismEffect):
     parameters = (
         Parameter('tau_c', 'N m', 'moment of friction', 0.001, 0.15, 0.0, (0.01, 0.05),
                   log=True),)
-    invertible = False
 
     def resistance(self):
         """Return the friction's moment."""
@@ -79,6 +78,27 @@ class Inertia(MechanismEffect):
         return 0.0, 0.0, self.I
 
 
+class FrameTilt(MechanismEffect):
+    """The frame does not stand upright."""
+
+    id = 'frame_tilt'
+    sentence = 'The frame leans, so gravity pulls the forearm at another angle.'
+    equation = 'tau(theta) -> tau(theta + phi)'
+    source = 'Eq. 16 of the paper with gravity turned by phi'
+    shows_in = 'cos theta'
+    experiment = 'put a spirit level on the frame'
+    confused_with = ('payload_error', 'encoder_offset')
+    parameters = (
+        Parameter('phi', 'deg', 'angle by which the frame leans forward', 1.0, 25.0, 0.0,
+                  (-5.0, 5.0), both_signs=True),)
+
+    def forward(self, statics, geometry):
+        """Turn the load's moment, and the direction in which other weights pull."""
+        upright = statics.upright + math.radians(self.phi)
+        turned = geometry.load_moment(upright) - geometry.load_moment(statics.upright)
+        return dataclasses.replace(add_moment(statics, turned), upright=upright)
+
+
 class PayloadError(MechanismEffect):
     """The payload is not what the geometry file says."""
 
@@ -95,7 +115,7 @@ class PayloadError(MechanismEffect):
 
     def forward(self, statics, geometry):
         """Add the weight's moment."""
-        arm = geometry.gravity * geometry.forearm_length * np.sin(statics.theta)
+        arm = geometry.gravity * geometry.forearm_length * np.sin(statics.upright)
         return add_moment(statics, 1e-3 * self.dm * arm)
 
 
@@ -117,7 +137,7 @@ class ClampMass(MechanismEffect):
     def forward(self, statics, geometry):
         """Add the clamp's moment."""
         return add_moment(statics, 1e-3 * self.moment * geometry.gravity
-                          * np.sin(statics.theta + self.phi))
+                          * np.sin(statics.upright + self.phi))
 
 
 class GeometryError(MechanismEffect):
@@ -145,31 +165,13 @@ class GeometryError(MechanismEffect):
             geometry,
             clamp_distance=max(geometry.clamp_distance + 1e-3 * self.dx, 1e-3),
             clamp_height=max(geometry.clamp_height + 1e-3 * self.da, 0.0),
-            anchor_height=geometry.anchor_height + 1e-3 * self.dz)
-        assumed = geometry.length(statics.theta)
+            anchor_height=max(geometry.anchor_height + 1e-3 * self.dz, 1e-3))
+        theta = statics.theta
         return dataclasses.replace(
-            statics, length=statics.length + built.length(statics.theta) - assumed,
-            moment_arm=built.moment_arm(statics.theta))
-
-
-class FrameTilt(MechanismEffect):
-    """The frame does not stand upright."""
-
-    id = 'frame_tilt'
-    sentence = 'The frame leans, so gravity pulls the forearm at another angle.'
-    equation = 'tau(theta) -> tau(theta + phi)'
-    source = 'Eq. 16 of the paper with gravity turned by phi'
-    shows_in = 'cos theta'
-    experiment = 'put a spirit level on the frame'
-    confused_with = ('payload_error', 'encoder_offset')
-    parameters = (
-        Parameter('phi', 'deg', 'angle by which the frame leans forward', 1.0, 25.0, 0.0,
-                  (-5.0, 5.0), both_signs=True),)
-
-    def forward(self, statics, geometry):
-        """Turn the load's moment."""
-        turned = geometry.load_moment(statics.theta + math.radians(self.phi))
-        return add_moment(statics, turned - geometry.load_moment(statics.theta))
+            statics,
+            length=statics.length + (built.length(theta) - geometry.length(theta)),
+            moment_arm=statics.moment_arm + (
+                built.moment_arm(theta) - geometry.moment_arm(theta)))
 
 
 class EndStop(MechanismEffect):

@@ -51,22 +51,13 @@ class Backlash(SensorEffect):
     parameters = (
         Parameter('B', 'deg', 'width of the play', 0.2, 12.0, 0.0, (1.0, 4.0), log=True),)
 
-    def __init__(self, surroundings=None, **values):
-        super().__init__(surroundings, **values)
-        self.start()
+    memory = ('_state', '_target', '_lead')
 
     def start(self):
         """Forget the past: the play is centred at the first sample."""
         self._state = None
         self._target = None
         self._lead = 0.0
-
-    def inverse(self, response):
-        """Go further by half the play in the direction of the motion."""
-        if self._target is not None and response != self._target:
-            self._lead = math.copysign(0.5 * math.radians(self.B), response - self._target)
-        self._target = response
-        return response + self._lead
 
     def step(self, value, step):
         """Move the encoder only when the play is used up."""
@@ -76,10 +67,12 @@ class Backlash(SensorEffect):
         self._state = min(max(self._state, value - half), value + half)
         return self._state
 
-    def forward(self, response, inputs):
-        """Step through the trial."""
-        self.start()
-        return np.array([self.step(value, 0.0) for value in response.tolist()])
+    def inverse(self, response):
+        """Go further by half the play in the direction of the motion."""
+        if self._target is not None and response != self._target:
+            self._lead = math.copysign(0.5 * math.radians(self.B), response - self._target)
+        self._target = response
+        return response + self._lead
 
 
 class Latency(SensorEffect):
@@ -97,13 +90,11 @@ class Latency(SensorEffect):
     parameters = (
         Parameter('delay', 's', 'age of a measurement', 0.005, 5.0, 0.0, (0.1, 1.0), log=True),)
 
+    memory = ('_past',)
+
     def forward(self, response, inputs):
         """Read the response of a moment ago."""
         return np.interp(inputs.time - self.delay, inputs.time, response)
-
-    def __init__(self, surroundings=None, **values):
-        super().__init__(surroundings, **values)
-        self.start()
 
     def start(self):
         """Forget the past."""
@@ -111,7 +102,7 @@ class Latency(SensorEffect):
 
     def step(self, value, step):
         """Interpolate in what was seen within the delay."""
-        self._past = [(age + step, old) for age, old in self._past if age < self.delay]
-        self._past.append((0.0, value))
+        past = [[age + step, old] for age, old in self._past if age < self.delay]
+        self._past = [*past, [0.0, value]]
         ages, values = zip(*reversed(self._past))
         return float(np.interp(self.delay, ages, values))

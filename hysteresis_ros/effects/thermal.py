@@ -6,6 +6,9 @@ Effects on the heat balance of Eq. 1, ``dT/dt = -d1 (T - T0) + d2 V^2``.
 They work on the heat: the steady-state voltage squared, ``q = Vs^2 = (d1/d2) (T - T0)``, in which
 Eq. 1 reads ``dq/dt = d1 (V^2 - q)``. For a drive that is itself a temperature, pressure or power,
 the heat is the drive.
+
+They act in the order of this file: the heat transfer divides what comes in, the lags follow, and
+what the air adds comes last, because it changes slowly and the wire is in balance with it.
 """
 
 import math
@@ -13,13 +16,40 @@ import math
 import numpy as np
 
 from hysteresis_ros.effects.base import DriveEffect, Parameter
-from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 
 
 class ThermalEffect(DriveEffect):
     """An effect on the heat that the muscle feels."""
 
     stage = 'thermal'
+
+
+class Airflow(ThermalEffect):
+    """A fan or a draught changes how well the wire is cooled."""
+
+    id = 'airflow'
+    sentence = 'More or less air over the wire changes what a voltage heats, and how fast.'
+    equation = 'd1 -> beta d1: Vs^2 = V^2 / beta'
+    source = 'Eq. 1 of the paper: d1 is proportional to the heat transfer coefficient'
+    shows_in = 'V, and the time constant'
+    experiment = 'switch the fan and watch gain and time constant change together'
+    confused_with = ('supply_sag',)
+    parameters = (
+        Parameter('beta', '1', 'heat transfer over that of the bench', 0.5, 3.0, 1.0, (0.8, 1.3),
+                  log=True),)
+
+    @property
+    def exchange(self):
+        """Heat transfer over that of the bench, which the lags follow."""
+        return self.beta
+
+    def forward(self, signal, inputs, surroundings):
+        """Divide the heat by the better cooling."""
+        return signal / self.beta
+
+    def inverse(self, signal, inputs, surroundings):
+        """Multiply it again."""
+        return signal * self.beta
 
 
 class FirstOrderLag(ThermalEffect):
@@ -32,16 +62,14 @@ class FirstOrderLag(ThermalEffect):
     needs_transients = True
     kinds = ('arm', 'bench')
 
-    # How much faster than on the bench heat is exchanged: beta of `airflow`.
+    memory = ('_heat', '_phase')
+
+    # How much faster than on the bench heat is exchanged: beta of `airflow`, set by the chain.
     speed = 1.0
 
     def rate(self, rising: bool) -> float:
-        """Return d1 [1/s] while the heat rises or falls."""
-        return self.speed / max(self.time_constant, 1e-3)
-
-    def __init__(self, surroundings=None, **values):
-        super().__init__(surroundings, **values)
-        self.start()
+        """Return d1 [1/s] while the heat rises or falls, infinite without a lag."""
+        return self.speed / self.time_constant if self.time_constant > 0.0 else math.inf
 
     def start(self):
         """Forget the past: no heat."""
@@ -51,19 +79,24 @@ class FirstOrderLag(ThermalEffect):
     def step(self, value, step, phase, surroundings):
         """Advance Eq. 1 by `step` [s] towards `value`."""
         if self._heat is None:
-            # A trial starts cold: without drive where the drive heats, else where the drive is.
-            self._heat = 0.0 if surroundings.drive in ELECTRIC_DRIVES else value
-        if step > 0.0:
-            decay = math.exp(-self.rate(value > self._heat) * step)
-            self._heat = value + (self._heat - value) * decay
+            # A trial starts cold: without drive, but at the first one where that is a temperature.
+            self._heat = value if surroundings.drive == 'temperature' else 0.0
+        self._heat = value + (self._heat - value) * self._decay(value, step)
         return self._heat
 
     def inverse(self, signal, inputs, surroundings):
-        """Return the input that brings the heat to `signal` within the time of one step."""
+        """Return the input that brings the heat to `signal` in ``inputs.step`` seconds."""
         if self._heat is None or not 0.0 < inputs.step < math.inf:
             return signal
-        decay = math.exp(-self.rate(signal > self._heat) * inputs.step)
-        return (signal - self._heat * decay) / max(1.0 - decay, 1e-3)
+        decay = self._decay(signal, inputs.step)
+        return signal + (signal - self._heat) * decay / max(1.0 - decay, 1e-3)
+
+    def _decay(self, value, step):
+        """Return the share of the distance to `value` that is left after `step` [s]."""
+        rate = self.rate(value > self._heat)
+        if rate == math.inf:
+            return 0.0
+        return math.exp(-rate * step)
 
 
 class ThermalLag(FirstOrderLag):
@@ -108,7 +141,7 @@ class LatentHeat(FirstOrderLag):
 
     id = 'latent_heat'
     sentence = 'While the wire transforms, the latent heat slows its temperature down.'
-    equation = 'dq/dt = d1 (V^2 - q) + h dxi/dt, xi the martensite share'
+    equation = 'dq/dt = d1 (V^2 - q) + h qmax dxi/dt, xi the martensite share'
     source = 'heat balance with the enthalpy of transformation, about 24 kJ/kg'
     shows_in = 'slow parts inside the loop only'
     experiment = 'small steps in and out of the loop'
@@ -118,16 +151,27 @@ class LatentHeat(FirstOrderLag):
     parameters = (
         Parameter('time_constant', 's', 'time constant 1/d1 outside the transformation', 1.0, 10.0,
                   0.0, (2.0, 5.0), log=True),
-        Parameter('latent', '1', 'latent heat over the heat stored at full drive', 0.05, 1.0, 0.0,
+        Parameter('latent', '1', 'h: latent heat over the heat stored at full drive', 0.05, 1.0, 0.0,
                   (0.2, 0.5), log=True),)
 
     def step(self, value, step, phase, surroundings):
         """Advance with what the change of phase gives off."""
-        previous, self._phase = self._phase, phase
-        heat = super().step(value, step, phase, surroundings)
-        if previous is not None and math.isfinite(phase) and math.isfinite(previous):
-            self._heat = heat + self.latent * surroundings.heat * (phase - previous)
+        released = self._released(phase, surroundings)
+        if math.isfinite(phase):
+            self._phase = phase
+        self._heat = super().step(value, step, phase, surroundings) + released
         return self._heat
+
+    def inverse(self, signal, inputs, surroundings):
+        """Bring up what the transformation on the way to `signal` takes up, too."""
+        released = self._released(inputs.phase, surroundings)
+        return super().inverse(signal - released, inputs, surroundings)
+
+    def _released(self, phase, surroundings):
+        """Return the heat that changing from the phase before to `phase` gives off."""
+        if self._phase is None or not math.isfinite(phase):
+            return 0.0
+        return self.latent * surroundings.heat * (phase - self._phase)
 
 
 class AmbientTemperature(ThermalEffect):
@@ -184,26 +228,3 @@ class AmbientDrift(ThermalEffect):
         """Add a slow function of the time since the recording began."""
         t = inputs.clock / self.CLOCK_UNIT
         return signal + self.offset + self.rate * t + self.curvature * t * t
-
-
-class Airflow(ThermalEffect):
-    """A fan or a draught changes how well the wire is cooled."""
-
-    id = 'airflow'
-    sentence = 'More or less air over the wire changes what a voltage heats, and how fast.'
-    equation = 'd1 -> beta d1: Vs^2 = V^2 / beta'
-    source = 'Eq. 1 of the paper: d1 is proportional to the heat transfer coefficient'
-    shows_in = 'V, and the time constant'
-    experiment = 'switch the fan and watch gain and time constant change together'
-    confused_with = ('supply_sag',)
-    parameters = (
-        Parameter('beta', '1', 'heat transfer over that of the bench', 0.5, 3.0, 1.0, (0.8, 1.3),
-                  log=True),)
-
-    def forward(self, signal, inputs, surroundings):
-        """Divide the heat by the better cooling."""
-        return signal / self.beta
-
-    def inverse(self, signal, inputs, surroundings):
-        """Multiply it again."""
-        return signal * self.beta

@@ -162,6 +162,7 @@ def _force_stage(model, force, rows, levels, kind, anchored):
     parts = [np.concatenate(([model.cold_drive], drive[part])) for _, part in _parts(force, rows)]
     anchor = (model.cold_drive, float(target[rows][0])) if anchored else None
     return fit_operator(kind, parts, target[rows], force.column('trial')[rows], levels,
+                        reversible=True,
                         anchor=anchor)
 
 

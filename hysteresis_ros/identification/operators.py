@@ -8,18 +8,21 @@ import numpy as np
 from scipy import optimize
 
 from hysteresis_ros.errors import IdentificationError
-from hysteresis_ros.identification.least_squares import Anchor, WeightFit, fit_weights
+from hysteresis_ros.identification.least_squares import SLACK, Anchor, WeightFit, fit_weights
 from hysteresis_ros.operators import (
     BoucWen, HysteresisOperator, Linear, Preisach, PrandtlIshlinskii, cell_areas, cells,
-    signed_areas)
+    signed_areas, signed_lengths)
 
 # The grid reaches this far beyond the data, as a share of the data's range.
 MARGIN = 1e-6
+# Of the penalty: density of the cells, and of the reversible weights, against its smoothness.
+CELL_RIDGE, REVERSIBLE_RIDGE = 0.1, 10.0
 
 
 def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, groups: np.ndarray,
                  levels: int, anchor: tuple[float, float] | None = None,
-                 strength: float | None = None) -> tuple[HysteresisOperator, WeightFit | None]:
+                 strength: float | None = None, strengths: Sequence[float] | None = None,
+                 reversible: bool = True) -> tuple[HysteresisOperator, WeightFit | None]:
     """
     Fit an operator that rises with its input.
 
@@ -39,6 +42,11 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
         Input, reached from saturation, at which the output is known.
     strength : float, optional
         Of the regularisation; 0 is the paper's plain problem. Default: cross-validated.
+    strengths : sequence of float, optional
+        That cross-validation chooses from.
+    reversible : bool
+        Whether a Preisach operator gets reversible weights, for the part of its output without
+        hysteresis: elastic stretch, a force that hardly loops. The paper's has none.
 
     Returns
     -------
@@ -56,11 +64,12 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
         raise IdentificationError('the input of an operator does not vary; nothing to identify')
     margin = MARGIN * (high - low)
     low, high = low - margin, high + margin
+    options = {'groups': groups, 'strength': strength, 'strengths': strengths}
     if kind == 'preisach':
-        return _preisach(parts, target, groups, np.linspace(low, high, levels + 1), anchor,
-                         strength)
+        nodes = np.linspace(low, high, levels + 1)
+        return fit_preisach(parts, target, nodes, anchor=anchor, reversible=reversible, **options)
     if kind == 'play':
-        return _play(parts, target, groups, low, high, levels, strength)
+        return _play(parts, target, low, high, levels, options)
     if kind == 'linear':
         slope, intercept = np.polyfit(np.concatenate([part[1:] for part in parts]), target, 1)
         return Linear(float(slope), float(intercept), low, high), None
@@ -69,42 +78,75 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
     raise IdentificationError(f'no operator of kind {kind!r}')
 
 
-def smoothness(nodes: np.ndarray) -> np.ndarray:
+def smoothness(nodes: np.ndarray, reversible: bool = False) -> np.ndarray:
     """
-    Return the root of the penalty on differences between neighbouring cells, shape (R, K).
+    Return the root of the penalty on a rough weight function.
 
-    It acts on weight times area, taken back to the density, so that cells of any size count alike;
-    a small multiple of the identity keeps cells without data at zero.
+    It acts on weight times area (reversible weight times length), brought back to densities on a
+    plane of side 1, so that it means the same on every grid. Penalised are differences between
+    cells that are neighbours along the diagonal, because they stand for loops of the same width,
+    and, less, the densities themselves, so that cells without data stay at zero. Differences
+    across the diagonal are not: there the weight of a mild hysteresis rises steeply.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (N + 1,)
+        Grid.
+    reversible : bool
+        Whether columns for the N reversible weights follow those of the K cells.
+
+    Returns
+    -------
+    ndarray, shape (R, K) or (R, K + N)
     """
-    levels = len(nodes) - 1
-    row, column = cells(levels)
-    number = {place: k for k, place in enumerate(zip(row.tolist(), column.tolist()))}
-    area = cell_areas(nodes)
-    density = area.max() / area
-    rows = []
-    for (i, j), k in number.items():
-        for other in (number.get((i + 1, j)), number.get((i, j + 1))):
-            if other is not None:
-                difference = np.zeros(len(area))
-                difference[k], difference[other] = density[k], -density[other]
-                rows.append(difference)
-    return np.vstack([np.array(rows).reshape(-1, len(area)), 0.1 * np.diag(density)])
+    width = np.diff(nodes) / (nodes[-1] - nodes[0])
+    beta, alpha = cells(len(width))
+    area = width[beta] * width[alpha] * np.where(beta == alpha, 0.5, 1.0)
+    place = {cell: k for k, cell in enumerate(zip(beta.tolist(), alpha.tolist()))}
+    pairs = [(k, place[b + 1, a + 1]) for (b, a), k in place.items() if (b + 1, a + 1) in place]
+    first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
+    # Squared distance of the two cells' middles, in units of a diagonal step on this grid.
+    step = (np.square(width[beta[first]] + width[beta[second]])
+            + np.square(width[alpha[first]] + width[alpha[second]])) / 8.0
+    gain = np.sqrt((area[first] + area[second]) / (2.0 * step))
+    differences = np.zeros((len(pairs), len(area)))
+    row = np.arange(len(pairs))
+    differences[row, first] = gain / area[first]
+    differences[row, second] = -gain / area[second]
+    root = np.vstack([differences, np.diag(np.sqrt(CELL_RIDGE / area))])
+    if not reversible:
+        return root
+    ridge = np.diag(np.sqrt(REVERSIBLE_RIDGE / width))
+    return np.block([[root, np.zeros((len(root), len(width)))],
+                     [np.zeros((len(width), len(area))), ridge]])
 
 
-def _preisach(parts, target, groups, nodes, anchor, strength):
-    rows = np.concatenate([signed_areas(nodes, part)[1:] for part in parts])
+def preisach_rows(nodes: np.ndarray, inputs: np.ndarray, reversible: bool = False) -> np.ndarray:
+    """Return what every weight contributes after each input from the cold state, (M, K [+ N])."""
+    rows = signed_areas(nodes, inputs)
+    return np.hstack([rows, signed_lengths(nodes, inputs)]) if reversible else rows
+
+
+def fit_preisach(parts, target, nodes, *, groups=None, anchor=None, reversible=True,
+                 strength=None, strengths=None) -> tuple[Preisach, WeightFit]:
+    """Fit a Preisach operator on a given grid; the parameters are those of `fit_operator`."""
+    rows = np.concatenate([preisach_rows(nodes, part, reversible)[1:] for part in parts])
+    scale = cell_areas(nodes)
+    if reversible:
+        scale = np.append(scale, np.diff(nodes))
     anchors = ()
     if anchor is not None:
-        anchors = (Anchor(signed_areas(nodes, np.array([anchor[0]]))[0], anchor[1]),)
-    fit = fit_weights(rows, target, groups=groups, scale=2.0 * cell_areas(nodes), sign=1,
-                      strength=strength, penalty=PENALTY(nodes), anchors=anchors)
-    return Preisach(nodes, fit.weights, fit.bias), fit
+        row = preisach_rows(nodes, np.array([anchor[0]]), reversible)[0]
+        anchors = (Anchor(row, anchor[1]),)
+    fit = fit_weights(rows, target, groups=groups, scale=scale, sign=1, strength=strength,
+                      strengths=strengths, slack=SLACK, penalty=smoothness(nodes, reversible),
+                      anchors=anchors)
+    count = len(cell_areas(nodes))
+    return Preisach(nodes, fit.weights[:count], fit.bias,
+                    fit.weights[count:] if reversible else None), fit
 
 
-PENALTY = smoothness
-
-
-def _play(parts, target, groups, low, high, levels, strength):
+def _play(parts, target, low, high, levels, options):
     radii = np.linspace(0.0, 0.5 * (high - low), levels + 1)[:-1]
     columns = []
     for radius in radii:
@@ -115,8 +157,9 @@ def _play(parts, target, groups, low, high, levels, strength):
             outputs.append(single.simulate(part)[1:])
         columns.append(np.concatenate(outputs))
     rows = np.column_stack(columns)
-    fit = fit_weights(rows, target, groups=groups, scale=np.maximum(np.ptp(rows, axis=0), 1e-300),
-                      sign=1, strength=strength)
+    # A play whose clearance is never taken up contributes nothing.
+    scale = np.maximum(np.ptp(rows, axis=0), 1e-12 * (high - low))
+    fit = fit_weights(rows, target, scale=scale, sign=1, slack=SLACK, **options)
     return PrandtlIshlinskii(radii, fit.weights, fit.bias, low, high), fit
 
 
@@ -130,8 +173,8 @@ def _bouc_wen(parts, target, low, high):
             states.append(unit.simulate(part)[1:])
         inputs = np.concatenate([part[1:] for part in parts])
         rows = np.column_stack([inputs, np.concatenate(states)])
-        fit = fit_weights(rows, target, scale=np.maximum(np.ptp(rows, axis=0), 1e-300), sign=1,
-                          strength=1e-9)
+        scale = np.maximum(np.ptp(rows, axis=0), 1e-12 * (high - low))
+        fit = fit_weights(rows, target, scale=scale, sign=1, strength=1e-9)
         return fit, (rate, shape, exponent)
 
     start = np.array([np.log(6.0 / (high - low)), 0.0, 0.0])
