@@ -11,6 +11,8 @@ from hysteresis_ros.share import share_path
 
 # The model's effects move an angle by a few degrees; each pass leaves a few percent of that.
 PASSES = 6
+# Where the effects sit that are undone before the muscle's reference; the others come after it.
+STAGES = ('mechanism', 'sensor')
 
 
 def load_model(path: str, values: Mapping, logger):
@@ -69,7 +71,7 @@ class ArmReference:
 
     def __init__(self, geometry: BicepGeometry, model=None):
         self._geometry = geometry
-        if model is None:
+        if model is None or not any(effect.stage in STAGES for effect in model.effects):
             self.reference = self._probe = geometry.reference
         else:
             self.reference = model.controller().reference

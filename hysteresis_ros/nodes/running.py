@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The main function that all nodes share: start, spin, and a clean end however it comes."""
 
+import gc
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -39,6 +40,8 @@ def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
     try:
         _start_rclpy(args)
         node = make_node()
+        # What is there now stays for good: collections need not look at it between two messages.
+        gc.freeze()
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
