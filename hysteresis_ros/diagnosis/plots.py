@@ -19,7 +19,7 @@ MOST_DOTS = 5000
 
 MEASURED = {'color': '#000000', 'linewidth': 1.3, 'linestyle': '-'}
 MODEL = {'color': '#2f6db5', 'linewidth': 1.3, 'linestyle': (0, (5, 1.5))}
-LINEAR = {'color': '#e6a03c', 'linewidth': 1.0, 'linestyle': (0, (1, 1.2))}
+LINEAR = {'color': '#d98a1f', 'linewidth': 1.3, 'linestyle': (0, (1, 1))}
 DOTS = {'color': '#9aa7b5', 'markersize': 2.0, 'linestyle': 'none', 'marker': '.', 'alpha': 0.5}
 MEANS = {'color': '#12355b', 'linewidth': 1.4, 'marker': 'o', 'markersize': 3.5, 'capsize': 2.5}
 SIGNED = 'cividis'
@@ -36,7 +36,7 @@ def figures(comparison):
     Returns
     -------
     dict of str to matplotlib.figure.Figure
-        By file name without suffix: `overlay`, `residual`, `signals`, `loop`, and where the
+        By file name without suffix: `overlay`, `signals`, `loop`, and where the
         recording has what they need `plane`, `since_step`, `correlogram`, `coverage`.
 
     """
@@ -235,6 +235,9 @@ def against(axis, comparison, name, values, residual, block):
     limit = 1.1 * max(largest if largest < 3 * spread else spread, spread, 1e-12)
     axis.set_ylim(-limit, limit)
     axis.set_xlabel(axis_label(name), fontsize=8)
+    if name == 'direction':
+        axis.set_xticks([-1, 1], ['falling', 'rising'])
+        axis.set_xlim(-1.5, 1.5)
 
 
 def residual_on_loop(comparison):
@@ -329,6 +332,8 @@ def residual_since_step(comparison):
     matplotlib.figure.Figure
 
     """
+    from matplotlib.ticker import NullFormatter
+
     figure, axes = new_figure(6, 3.6)
     axis, quantity = axes[0, 0], comparison.quantity
     since, residual = comparison.signals['time_since_step'], comparison.residual
@@ -340,11 +345,13 @@ def residual_since_step(comparison):
         inside = (direction == way) & (since > 0)
         if np.sum(inside) < 10:
             continue
-        bins = binned('time_since_step', since[inside], residual[inside], block[inside])
+        edges = np.geomspace(since[inside].min(), since[inside].max(), 13)[1:-1]
+        bins = binned('time_since_step', since[inside], residual[inside], block[inside], edges)
         half = np.where(np.isfinite(bins.half), bins.half, 0.0)
         axis.errorbar(bins.centre, scaled(quantity, bins.mean), scaled(quantity, half),
                       label=text, **{**MEANS, **style, 'markersize': 5})
     axis.set_xscale('log')
+    axis.xaxis.set_minor_formatter(NullFormatter())
     axis.axhline(0.0, color='black', linewidth=0.8)
     axis.set_xlabel(axis_label('time_since_step'))
     axis.set_ylabel(f'measured - predicted [{label(quantity)[1] or "1"}]', fontsize=8)

@@ -8,6 +8,9 @@ import numpy as np
 DEAD_BAND = 2e-3
 """Share of the drive's range within which it counts as held."""
 
+STEP = 3.0
+"""A change of more than this many dead bands from one row to the next is a step, not a ramp."""
+
 MOVING_SHARE = 0.2
 
 
@@ -37,7 +40,9 @@ def signals_of(measurement, predicted, geometry=None):
             found[name] = measurement.column(name)
     if geometry is not None and response == 'angle':
         found['force'] = geometry.force(np.clip(predicted, *geometry.angle_range))
-    last, direction = changes(measurement)
+    last, jump = changes(measurement)
+    # The cold state that every trial begins in was reached by cooling.
+    direction = np.where(jump > 0, 1.0, -1.0)
     found['direction'] = direction
     time = measurement.time
     if time is None:
@@ -48,7 +53,8 @@ def signals_of(measurement, predicted, geometry=None):
         if len(measurement.trials) > 1:
             found['elapsed_time'] = elapsed(measurement)
     if not measurement.settled:
-        held = last < np.arange(len(last))
+        band = DEAD_BAND * float(np.ptp(drive))
+        held = (last < np.arange(len(last))) & (np.abs(jump) > STEP * band)
         if np.mean(held) > MOVING_SHARE:
             found['time_since_step'] = time - time[last]
         if np.mean(~held) > MOVING_SHARE:
@@ -68,7 +74,7 @@ def varies(values):
 
 def changes(measurement):
     """
-    Find when the drive last changed, and which way, ignoring ripple within a dead band.
+    Find when the drive last changed, and by how much, ignoring ripple within a dead band.
 
     Parameters
     ----------
@@ -77,24 +83,21 @@ def changes(measurement):
     Returns
     -------
     last : ndarray of int (rows,)
-        Row at which the drive last changed, the trial's first row before any change.
-    direction : ndarray of float64 (rows,)
-        1, -1, or 0 before any change.
+        Row at which the drive last left the dead band, the trial's first row before that.
+    jump : ndarray of float64 (rows,)
+        By how much it had changed then, 0 before any change.
 
     """
     drive = measurement.column(measurement.drive)
     band = DEAD_BAND * float(np.ptp(drive))
-    last = np.empty(len(drive), dtype=int)
-    direction = np.zeros(len(drive))
+    last, jump = np.empty(len(drive), dtype=int), np.zeros(len(drive))
     for _, rows in measurement.split():
-        level, since, way = drive[rows.start], rows.start, 0.0
+        level, since, change = drive[rows.start], rows.start, 0.0
         for row, value in enumerate(drive[rows].tolist(), rows.start):
-            if value > level + band:
-                level, since, way = value - band, row, 1.0
-            elif value < level - band:
-                level, since, way = value + band, row, -1.0
-            last[row], direction[row] = since, way
-    return last, direction
+            if abs(value - level) > band:
+                level, since, change = value, row, value - level
+            last[row], jump[row] = since, change
+    return last, jump
 
 
 def elapsed(measurement):

@@ -18,7 +18,7 @@ from scipy.stats import t as student
 MOST_BINS = 12
 FEWEST_ROWS = 4
 FEWEST_BLOCKS = 12
-LEAST_SHARE = 0.02
+LEAST_SHARE = 0.03
 MOST_REGIONS = 8
 CONFIDENCE = 0.95
 
@@ -162,7 +162,7 @@ def correlogram(residual, most=None):
     return covariance / covariance[0]
 
 
-def binned(signal, values, residual, block):
+def binned(signal, values, residual, block, edges=None):
     """
     Average a residual in bins of a signal.
 
@@ -172,14 +172,20 @@ def binned(signal, values, residual, block):
     values, residual : ndarray, (rows,)
     block : ndarray of int (rows,)
         As `blocks_of` gives them.
+    edges : ndarray, (bins - 1,), optional
+        Where one bin ends and the next begins.
 
     Returns
     -------
     Bins
-        As many rows in each as the values allow; one value a bin if there are few values.
+        Without edges: as many rows in each as the values allow, one value a bin if there are
+        few values. Bins without rows are left out.
 
     """
-    index = bin_index(values)
+    if edges is None:
+        index = bin_index(values)
+    else:
+        index = np.unique(np.searchsorted(edges, values), return_inverse=True)[1]
     rows = np.bincount(index)
     mean = np.bincount(index, residual) / rows
     rmse = np.sqrt(np.bincount(index, residual ** 2) / rows)
@@ -245,12 +251,10 @@ def regions(signals, residual, block, quantity):
         bins = binned(name, values, residual, block)
         best = worst_run(bins, float(np.mean(residual)))
         if best is not None and best[0] > LEAST_SHARE * total:
-            score, first, last = best
+            score, first, last = best[:3]
             inside = (values >= bins.low[first]) & (values <= bins.high[last])
             scored.append((score, region(name, bins.low[first], bins.high[last],
-                                         residual[inside], total, len(residual), quantity,
-                                         both=bool(abs(np.mean(residual[inside]))
-                                                   < 0.5 * np.std(residual[inside])))))
+                                         residual[inside], total, len(residual), quantity)))
     scored.sort(key=lambda item: -item[0])
     found = [item for _, item in scored[:MOST_REGIONS]]
     overall = offset_everywhere(signals, residual, block, quantity, total)
@@ -269,8 +273,9 @@ def worst_run(bins, overall):
 
     Returns
     -------
-    tuple of (float, int, int) or None
-        Squared error that the run has above the overall mean, first and last bin.
+    tuple of (float, int, int, bool) or None
+        Squared error that the run has above the overall, first and last bin, and whether it is
+        off in one direction; otherwise its rows scatter more than others.
 
     """
     sign = np.where(bins.certain, np.sign(bins.mean), 0.0)
@@ -280,7 +285,7 @@ def worst_run(bins, overall):
     typical = float(np.sum(bins.rows * bins.rmse ** 2) / np.sum(bins.rows))
     scatter = bins.rows * np.maximum(bins.rmse ** 2 - 2.0 * typical, 0.0)
     best = None
-    for score, kind in ((systematic, sign), (scatter, np.sign(scatter))):
+    for score, kind, one_way in ((systematic, sign, True), (scatter, np.sign(scatter), False)):
         first = 0
         while first < len(score):
             last = first
@@ -288,8 +293,10 @@ def worst_run(bins, overall):
                    and kind[last + 1] == kind[first]):
                 last += 1
             found = float(np.sum(score[first:last + 1]))
-            if found > 0 and (best is None or found > best[0]):
-                best = found, first, last
+            # Scatter is named only where it says clearly more than a mean would.
+            needed = 0.0 if best is None else best[0] * (1.0 if one_way == best[3] else 2.0)
+            if found > needed:
+                best = found, first, last, one_way
             first = last + 1
     return best
 
@@ -306,16 +313,16 @@ def offset_everywhere(signals, residual, block, quantity, total):
                   whole=True)
 
 
-def region(name, low, high, residual, total, rows, quantity, both=False,
-           whole=False):
+def region(name, low, high, residual, total, rows, quantity, whole=False):
     """Build a region from its rows' residual, with its sentence."""
     mean, rmse = float(np.mean(residual)), float(np.sqrt(np.mean(residual ** 2)))
     share = float(np.sum(residual ** 2)) / total
     _, unit, scale = label(quantity)
     what = 'longer' if quantity in ('length', 'strain') else 'larger'
     less = 'shorter' if quantity in ('length', 'strain') else 'smaller'
-    if both:
-        error = f'the error is {number(scale * rmse)} {unit} RMS, of both signs,'
+    if abs(mean) < 0.5 * rmse:
+        error = (f'the error is {number(scale * rmse)} {unit} RMS, of both signs '
+                 f'(mean {number(scale * mean)} {unit}),')
     else:
         error = (f'the measured {quantity} is {number(abs(scale * mean))} {unit} '
                  f'{what if mean > 0 else less} than predicted')
@@ -329,9 +336,7 @@ def placed(name, low, high):
     """Say in words which part of a signal's range is meant."""
     text, unit, scale = label(name)
     if name == 'direction':
-        words = {-1.0: 'while the drive falls', 0.0: 'before the drive first moves',
-                 1.0: 'while the drive rises'}
-        return ' and '.join(words[way] for way in (-1.0, 0.0, 1.0) if low <= way <= high)
+        return 'while the drive falls' if high < 0 else 'while the drive rises'
     if name in ('trial', 'trial_number'):
         after = '' if name == 'trial' else ' of all recordings (counted from 0)'
         return (f'in trial {low:g}' if low == high else f'in trials {low:g} to {high:g}') + after

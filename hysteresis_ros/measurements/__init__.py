@@ -6,14 +6,14 @@ from pathlib import Path
 
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.bag import is_bag, read_bag
-from hysteresis_ros.measurements.csv import read_csv, write_csv
+from hysteresis_ros.measurements.csv import read_csv, read_reference, write_csv
 from hysteresis_ros.measurements.quantities import QUANTITIES, Quantity
 from hysteresis_ros.measurements.table import (
     Measurement, MeasurementWarning, settled_rows, SETTLED_HOLD)
 
 __all__ = [
     'Measurement', 'MeasurementWarning', 'QUANTITIES', 'Quantity', 'SETTLED_HOLD', 'read_bag',
-    'read_csv', 'read_measurement', 'settled_rows', 'write_csv']
+    'read_csv', 'read_measurement', 'read_reference', 'settled_rows', 'write_csv']
 
 
 def read_measurement(path, namespace=None):

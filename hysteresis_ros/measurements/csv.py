@@ -9,8 +9,9 @@ from pathlib import Path
 import warnings
 
 from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.measurements.quantities import RESPONSES
 from hysteresis_ros.measurements.table import (
-    classify, is_known, Measurement, MeasurementWarning)
+    classify, is_known, Measurement, MeasurementWarning, suggestion)
 import numpy as np
 
 LONGEST_LINE = 1_000_000
@@ -42,23 +43,56 @@ def read_csv(path):
 
     """
     path = Path(path)
-    try:
-        columns, notes = parse(path)
-    except UnicodeDecodeError as error:
-        raise MeasurementError(
-            f'{path}: no UTF-8 text ({error.reason} at byte {error.start}); save the table as '
-            'UTF-8 CSV') from None
-    except OSError as error:
-        raise MeasurementError(f'{path}: {error.strerror or error}') from None
+    columns, notes = parse(path, lambda names: classify(names, path))
     measurement = Measurement.from_columns(columns, str(path), digest(path), notes)
     for note in measurement.warnings:
         warnings.warn(note, MeasurementWarning, stacklevel=2)
     return measurement
 
 
-def parse(path):
+def read_reference(path):
+    """
+    Read a table of references: `trial, step` and what the muscle is to do.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    dict of str to ndarray of float64 (rows,)
+        Finite in every column whose name means something; `trial` is added if it is missing.
+
+    Raises
+    ------
+    MeasurementError
+        As `read_csv`, and for a table without a response.
+
+    """
+    path = Path(path)
+
+    def check(names):
+        if not any(name in names for name in RESPONSES):
+            raise MeasurementError(
+                f'{path}: a reference needs force, or force and length, or angle'
+                f'{suggestion(RESPONSES[0], names)}')
+
+    columns, notes = parse(path, check)
+    for note in notes:
+        warnings.warn(note, MeasurementWarning, stacklevel=2)
+    rows = len(next(iter(columns.values())))
+    return columns if 'trial' in columns else {'trial': np.zeros(rows), **columns}
+
+
+def parse(path, check):
     """
     Read header and numbers.
+
+    Parameters
+    ----------
+    path : Path
+    check : callable
+        Called with the names of the columns before the numbers are read; refuses by raising.
 
     Returns
     -------
@@ -67,8 +101,20 @@ def parse(path):
         Warnings.
 
     """
-    names, first = header(path)
-    classify(names, path)
+    try:
+        names, first = header(path)
+        check(names)
+        return numbers_of(path, names, first)
+    except UnicodeDecodeError as error:
+        raise MeasurementError(
+            f'{path}: no UTF-8 text ({error.reason} at byte {error.start}); save the table as '
+            'UTF-8 CSV') from None
+    except OSError as error:
+        raise MeasurementError(f'{path}: {error.strerror or error}') from None
+
+
+def numbers_of(path, names, first):
+    """Read the numbers under a header; as `parse`."""
     usable, notes = list(names), []
     if text_in_first_row(path, names, first):
         usable, notes = numeric_columns(path, names, first)
@@ -82,8 +128,7 @@ def parse(path):
         values = load(path, names, usable, first)
     if len(values) == 0:
         raise MeasurementError(f'{path}: the table has a header and no rows')
-    columns = {name: np.ascontiguousarray(values[:, n]) for n, name in enumerate(usable)}
-    return columns, notes
+    return {name: np.ascontiguousarray(values[:, n]) for n, name in enumerate(usable)}, notes
 
 
 def header(path):

@@ -1,0 +1,185 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What several commands share: reading files, progress, writing results."""
+
+import argparse
+import json
+from pathlib import Path
+import sys
+
+from hysteresis_ros.errors import MeasurementError, ParameterError
+from hysteresis_ros.measurements import read_measurement, settled_rows
+
+
+def one_line(text):
+    """Return text as one line that cannot move a terminal's cursor or set its colours."""
+    return ''.join(c if c.isprintable() else ' ' for c in ' '.join(str(text).split()))
+
+
+def numbers(text):
+    """
+    Read a list of trials: `0,2,5-7`.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    list of int
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is no such list.
+
+    """
+    found = []
+    try:
+        for part in text.split(','):
+            low, _, high = part.strip().partition('-')
+            last = int(high or low)
+            if last < int(low) or last - int(low) > 100_000:
+                raise ValueError
+            found += range(int(low), last + 1)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is no list of trials such as 0,2,5-7') from None
+    return found
+
+
+def add_data(parser, name='--data', required=True):
+    """Add the option that names measurements, and how bags are read."""
+    parser.add_argument(name, nargs='+', required=required, metavar='FILE',
+                        help='CSV files or rosbag2 folders')
+    parser.add_argument('--namespace', metavar='NS',
+                        help='which arm to take from a bag that recorded several')
+
+
+def add_model(parser):
+    """Add the option that names the model."""
+    parser.add_argument('--model', required=True, metavar='M.yaml', help='an identified model')
+
+
+def add_json(parser):
+    """Add the option that writes the result for programs."""
+    parser.add_argument('--json', metavar='J.json',
+                        help='write what is printed for programs; - for standard output')
+
+
+def read_all(paths, namespace=None, settled=False):
+    """
+    Read measurements.
+
+    Parameters
+    ----------
+    paths : sequence of str
+    namespace : str, optional
+    settled : bool
+        Reduce continuous runs to the ends of their holds.
+
+    Returns
+    -------
+    list of Measurement
+
+    Raises
+    ------
+    MeasurementError
+        If one cannot be read, or has no settled states.
+
+    """
+    found = []
+    for path in progress(paths, 'reading'):
+        measurement = read_measurement(path, namespace)
+        if settled:
+            reduced = settled_rows(measurement)
+            if reduced is None:
+                raise MeasurementError(f'{path}: the drive is not held for 20 s at a time, so '
+                                       'there are no settled states; leave --settled out')
+            measurement = reduced
+        found.append(measurement)
+    return found
+
+
+def progress(items, what, total=None):
+    """
+    Iterate with a bar on a terminal, silently elsewhere.
+
+    Parameters
+    ----------
+    items : iterable
+    what : str
+        Word before the bar.
+    total : int, optional
+
+    Returns
+    -------
+    iterable
+
+    """
+    if not sys.stderr.isatty():
+        return items
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        return items
+    return tqdm(items, desc=what, total=total, leave=False, delay=0.5)
+
+
+class Steps:
+    """
+    Shows which part of the work goes on, on a terminal.
+
+    Parameters
+    ----------
+    stream : file, optional
+        Standard error by default.
+
+    """
+
+    def __init__(self, stream=None):
+        self.stream = stream or sys.stderr
+        self.shown = self.stream.isatty()
+
+    def __call__(self, what):
+        """Replace the line by another part's name."""
+        if self.shown:
+            self.stream.write(f'\r\x1b[K{one_line(what)} ...')
+            self.stream.flush()
+
+    def clear(self):
+        """Leave an empty line behind."""
+        if self.shown:
+            self.stream.write('\r\x1b[K')
+            self.stream.flush()
+
+
+def write_json(path, content):
+    """
+    Write a result for programs.
+
+    Parameters
+    ----------
+    path : str
+        File, or `-` for standard output.
+    content : dict
+        Plain types; no NaN, which JSON does not have.
+
+    """
+    text = json.dumps(content, indent=2, allow_nan=False)
+    if path == '-':
+        print(text)
+    else:
+        Path(path).write_text(text + '\n', encoding='utf-8')
+
+
+def say(args, text):
+    """Print for a person, unless standard output is a program's."""
+    print(text, file=sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout)
+
+
+def must_differ(output, *inputs):
+    """Refuse to write over a file that is read."""
+    for path in inputs:
+        if path is not None and Path(path).resolve() == Path(output).resolve():
+            raise ParameterError(f'{output}: the output would overwrite an input; name another')

@@ -1,0 +1,65 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`hysteresis compare`: model against measurement."""
+
+from pathlib import Path
+import sys
+
+from hysteresis_ros.cli.common import (
+    add_data, add_json, add_model, one_line, read_all, say, Steps, write_json)
+
+
+def add_parser(subparsers):
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        'compare', help='model against measurement: errors, where it fails, plots',
+        description='Simulates the response from the inputs alone and compares it with what was '
+        'measured: errors (Eqs. 23 and 24, RMSE) of the model, of each effect added to it, and '
+        'of the linear model; where the model fails; pictures.')
+    add_model(parser)
+    add_data(parser)
+    parser.add_argument('--settled', action='store_true',
+                        help='of a continuous run take only the ends of its holds')
+    add_json(parser)
+    parser.add_argument('--report', metavar='R.html', help='write one page with all pictures')
+    parser.add_argument('--plots', metavar='DIR', help='write the pictures as PNG files')
+    return parser
+
+
+def run(args):
+    """Do it."""
+    from hysteresis_ros.diagnosis.compare import compare
+    from hysteresis_ros.model import MuscleModel
+
+    steps = Steps()
+    model = MuscleModel.load(args.model)
+    measurements = read_all(args.data, args.namespace, args.settled)
+    comparison = compare(model, measurements, steps)
+    known = {note for measurement in measurements for note in measurement.warnings}
+    steps.clear()
+    for note in comparison.warnings:
+        if note not in known:
+            print(f'hysteresis: warning: {one_line(note)}', file=sys.stderr)
+    say(args, comparison.to_text())
+    if args.json:
+        write_json(args.json, comparison.to_json())
+    if args.report or args.plots:
+        draw(args, comparison, steps)
+
+
+def draw(args, comparison, steps):
+    """Write the page and the pictures that were asked for."""
+    from hysteresis_ros.diagnosis.compare_page import comparison_page, rendered
+    from hysteresis_ros.diagnosis.plots import figures
+
+    steps('drawing')
+    pictures = rendered(figures(comparison))
+    if args.plots:
+        folder = Path(args.plots)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, picture in pictures.items():
+            (folder / f'{name}.png').write_bytes(picture)
+    if args.report:
+        Path(args.report).write_text(
+            comparison_page(comparison, pictures, args.model), encoding='utf-8')
+    steps.clear()

@@ -1,0 +1,97 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line `hysteresis`: finds the command, reports errors in one line."""
+
+import argparse
+import importlib.util
+import os
+import sys
+import warnings
+
+from hysteresis_ros import __version__
+from hysteresis_ros.cli.common import one_line
+from hysteresis_ros.errors import HysteresisError
+from hysteresis_ros.measurements import MeasurementWarning
+
+COMMANDS = ('identify', 'compare', 'diagnose', 'extend', 'invert', 'predict', 'simulate',
+            'effects', 'table1', 'demo')
+
+DONE, FAILED, INTERRUPTED = 0, 1, 130
+
+
+def main(arguments=None):
+    """
+    Run one command.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Without the name of the program; those of the process by default.
+
+    Returns
+    -------
+    int
+        0 done, 1 it could not be done (one line on standard error says why). Wrong usage leaves
+        through SystemExit with status 2.
+
+    """
+    arguments = sys.argv[1:] if arguments is None else list(arguments)
+    parser = build_parser(arguments)
+    args = parser.parse_args(arguments)
+    with warnings.catch_warnings():
+        warnings.simplefilter('always', MeasurementWarning)
+        warnings.showwarning = show_warning
+        try:
+            return args.run(args) or DONE
+        except BrokenPipeError:
+            # The reader of our output has left; nothing more can be said to it.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return FAILED
+        except (HysteresisError, OSError) as error:
+            print(f'hysteresis {args.command}: error: {one_line(described(error))}',
+                  file=sys.stderr)
+            return FAILED
+        except KeyboardInterrupt:
+            print(f'hysteresis {args.command}: interrupted', file=sys.stderr)
+            return INTERRUPTED
+
+
+def build_parser(arguments):
+    """
+    Return the parser; only the command that is called is imported.
+
+    Parameters
+    ----------
+    arguments : list of str
+
+    Returns
+    -------
+    argparse.ArgumentParser
+
+    """
+    parser = argparse.ArgumentParser(
+        prog='hysteresis', description='Hysteresis models of artificial muscles: identify them, '
+        'compare them with measurements, and find the physics that they miss.',
+        epilog='hysteresis COMMAND --help explains a command.')
+    parser.add_argument('--version', action='version', version=f'hysteresis_ros {__version__}')
+    subparsers = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
+    called = next((word for word in arguments if not word.startswith('-')), None)
+    for name in [called] if called in COMMANDS else COMMANDS:
+        if importlib.util.find_spec(f'hysteresis_ros.cli.{name}') is None:
+            continue
+        command = importlib.import_module(f'hysteresis_ros.cli.{name}')
+        command.add_parser(subparsers).set_defaults(run=command.run)
+    return parser
+
+
+def described(error):
+    """Return what an error says; for one of the system the file comes first."""
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f'{error.filename}: {error.strerror}'
+    return str(error) or type(error).__name__
+
+
+def show_warning(message, category, filename, lineno, file=None, line=None):
+    """Print a warning in one line; ours without the place in the code."""
+    where = '' if issubclass(category, MeasurementWarning) else f'{filename}:{lineno}: '
+    print(f'hysteresis: warning: {one_line(where + str(message))}', file=sys.stderr)

@@ -1,0 +1,53 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`hysteresis simulate`: measurements of the virtual laboratory."""
+
+import argparse
+import math
+
+DESCRIPTION = """\
+Carries out an experiment in the virtual laboratory, on physics that shares nothing with the
+models, and writes the tables that a user would have. No file says what was hidden in it.
+"""
+
+
+def add_parser(subparsers):
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        'simulate', help='measurements of the virtual laboratory', description=DESCRIPTION)
+    parser.add_argument('protocol', metavar='PROTOCOL',
+                        help='bench, arm-steps, arm-dynamic, ...')
+    parser.add_argument('-o', '--output', required=True, metavar='DIR')
+    parser.add_argument('--effect', action='append', default=[], type=effect,
+                        metavar='NAME[=STRENGTH]',
+                        help='hide an effect; strength 1 is strong (default), 0.4 weak')
+    parser.add_argument('--seed', type=seed, default=0,
+                        help='of specimen, noise and random sequences')
+    return parser
+
+
+def effect(text):
+    """Read `NAME` or `NAME=strength`."""
+    name, given, strength = text.partition('=')
+    try:
+        value = float(strength) if given else 1.0
+    except ValueError:
+        value = math.nan
+    if not name or not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'{text!r} is not NAME or NAME=strength')
+    return name, value
+
+
+def seed(text):
+    """Read a number that can start a random sequence."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f'{text!r} is no whole number from 0 up')
+    return int(text)
+
+
+def run(args):
+    """Do it."""
+    from hysteresis_ros.laboratory.protocols import write_protocol
+
+    for path in write_protocol(args.protocol, args.output, dict(args.effect), args.seed):
+        print(path)

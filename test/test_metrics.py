@@ -1,0 +1,81 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Errors of Eqs. 23 and 24 as they have to be, and the noise that no model can remove."""
+
+from hypothesis import given, strategies
+from hypothesis.extra.numpy import arrays
+from hysteresis_ros.diagnosis.metrics import (
+    errors, noise_floor, repeat_noise, resolution_noise, sample_noise)
+from hysteresis_ros.measurements import Measurement
+import numpy as np
+import pytest
+
+
+def test_errors_by_hand():
+    found = errors(np.array([1.0, -1.0, 3.0, 1.0]), output_range=20.0)
+    assert found.mean_abs == pytest.approx(6 / 4)
+    assert found.std == pytest.approx(np.sqrt((0 + 4 + 4 + 0) / 4))
+    assert found.rmse == pytest.approx(np.sqrt((1 + 1 + 9 + 1) / 4))
+    assert found.mean_percent == pytest.approx(7.5)
+    assert found.std_percent == pytest.approx(100 * np.sqrt(2) / 20)
+
+
+@given(arrays(float, strategies.integers(1, 50), elements=strategies.floats(-1e3, 1e3)),
+       strategies.integers(2, 5))
+def test_repeating_the_rows_changes_no_error(residual, times):
+    once, often = errors(residual, 10.0), errors(np.tile(residual, times), 10.0)
+    np.testing.assert_allclose(often, once, rtol=1e-9, atol=1e-9)
+    assert once.std <= once.rmse + 1e-9
+    assert once.mean_abs <= once.rmse + 1e-9
+
+
+def test_a_response_that_does_not_vary_has_no_percentage():
+    found = errors(np.array([1.0, 1.0]), 0.0)
+    assert np.isnan(found.mean_percent)
+    assert found.to_json() == {'mean_abs': 1.0, 'std': 0.0, 'rmse': 1.0, 'mean_percent': None,
+                               'std_percent': None}
+
+
+def table(trials, **columns):
+    return Measurement.from_columns({'trial': trials, **columns})
+
+
+def test_resolution_is_the_step_of_the_sensor():
+    counts = np.array([0, 5, 17, 18, 40, 3])
+    measured = table(np.zeros(6), voltage=np.arange(6.0), force=0.25 * counts)
+    assert resolution_noise(measured) == pytest.approx(0.25 / np.sqrt(12))
+    flat = table(np.zeros(3), voltage=np.arange(3.0), force=np.ones(3))
+    assert resolution_noise(flat) == 0.0
+
+
+def test_samples_show_white_noise_on_a_slow_motion():
+    rng = np.random.default_rng(1)
+    time = np.arange(20000) / 100
+    angle = 1 + 0.3 * np.sin(time / 5) + 0.002 * rng.standard_normal(len(time))
+    run = table(np.zeros(len(time)), time=time, voltage=np.sin(time), angle=angle)
+    assert sample_noise(run) == pytest.approx(0.002, rel=0.05)
+    assert noise_floor([run]).origin == 'samples'
+    short = table(np.zeros(5), time=np.arange(5.0), voltage=np.arange(5.0), angle=np.arange(5.0))
+    assert sample_noise(short) == 0.0
+
+
+def test_repeats_show_what_differs_between_equal_trials():
+    rng = np.random.default_rng(2)
+    drive = np.tile(rng.uniform(0, 6, 200), 3)
+    trials = np.repeat([0, 1, 2], 200)
+    force = np.sin(drive) + 0.05 * rng.standard_normal(600)
+    repeated = table(trials, voltage=drive, force=force)
+    assert repeat_noise([repeated]) == pytest.approx(0.05, rel=0.1)
+    floor = noise_floor([repeated])
+    assert floor.origin == 'repeats' and floor.value == repeat_noise([repeated])
+    other = table(trials, voltage=rng.uniform(0, 6, 600), force=force)
+    assert repeat_noise([other]) is None
+    assert noise_floor([other]).origin == 'resolution'
+
+
+def test_trials_under_other_loads_are_no_repeats():
+    drive = np.tile(np.linspace(0, 6, 20), 2)
+    length = np.concatenate([np.linspace(0, 1e-3, 20), np.linspace(0, 2e-3, 20)])
+    measured = table(np.repeat([0, 1], 20), voltage=drive, length=length,
+                     force=np.repeat([1.0, 3.0], 20))
+    assert repeat_noise([measured]) is None
