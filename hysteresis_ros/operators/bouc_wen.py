@@ -49,9 +49,9 @@ class BoucWen(HysteresisOperator):
     rate : float
         rho > 0, in 1 / unit of the input: 1 / rho is the input over which w turns.
     shape : float
-        sigma >= 1/2, the thermodynamically admissible range, where |w| <= 1 holds.
+        sigma from 1/2 to 100. From 1/2 on the operator is thermodynamically admissible.
     exponent : float
-        n >= 1: how sharply w goes over into saturation.
+        n from 1 to 100: how sharply w goes over into saturation.
     bias : float
         Constant. Unit of the output.
     lower, upper : float
@@ -78,8 +78,9 @@ class BoucWen(HysteresisOperator):
         self._sign = one_sign(np.array([self.stiffness, self.gain]), f'{where}: stiffness, gain')
         if not 0.0 < self.rate <= LARGEST:
             raise ParameterError(f'{where}: rate is {self.rate}, it has to be above 0')
-        if not 0.5 <= self.shape <= LARGEST:
-            raise ParameterError(f'{where}: shape is {self.shape}, it has to be at least 0.5')
+        if not 0.5 <= self.shape <= 100.0:
+            raise ParameterError(f'{where}: shape is {self.shape}, it has to be at least 0.5 '
+                                 'and at most 100')
         if not 1.0 <= self.exponent <= 100.0:
             raise ParameterError(f'{where}: exponent is {self.exponent}, it has to be 1 to 100')
         self._curl = 2.0 * self.shape - 1.0
@@ -87,7 +88,7 @@ class BoucWen(HysteresisOperator):
         self._series = [(float(poch(b, k)) / math.factorial(k), float(psi(k + 1.0) - psi(b + k)))
                         for k in range(4)]
         self.reset()
-        ends = self.output, self.peek(self.upper)
+        ends = self.output, self._at(self.upper, 1.0)
         if not max(map(abs, ends)) <= LARGEST:
             raise ParameterError(f'{where}: the output reaches beyond {LARGEST:g}, use another '
                                  'unit')
@@ -113,11 +114,10 @@ class BoucWen(HysteresisOperator):
     @property
     def output_range(self) -> tuple[float, float]:
         """
-        Outputs that the cold state and a rise from it to `upper` give.
+        Outputs at the ends of the input range with the hidden state saturated.
 
-        No memory gives more, but some give less: the hidden state saturates over an input of
-        about 1 / rate, not at the ends of the range. The inverse flags what the present branch
-        cannot reach.
+        The hidden state saturates over an input of about 1 / rate, not at the ends of the
+        range, so the present branch may reach less; the inverse flags what it cannot reach.
         """
         return self._ends
 

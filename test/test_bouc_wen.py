@@ -1,0 +1,153 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The Bouc-Wen operator against its differential equation, and its inverse."""
+
+import json
+import math
+
+from hypothesis import given, settings, strategies as st
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.operators import BoucWen, operator_from_dict
+
+
+def example(stiffness=0.3, gain=2.0, rate=1.2, shape=0.8, exponent=1.7):
+    """Return an operator over -2 to 3."""
+    return BoucWen(stiffness, gain, rate, shape, exponent, 0.4, -2.0, 3.0)
+
+
+@pytest.mark.parametrize('shape', [0.5, 0.8, 2.5])
+@pytest.mark.parametrize('exponent', [1.0, 1.7, 2.0, 5.0])
+def test_steps_solve_the_differential_equation(shape, exponent):
+    operator = example(shape=shape, exponent=exponent)
+    w, u = -1.0, -2.0
+    for end in (1.0, -0.5, 2.0, 3.0, 0.3, 0.4):
+        def slope(_, state, side=math.copysign(1.0, end - u)):
+            w = state[0]
+            return [1.2 * (1.0 - shape * side * abs(w) ** (exponent - 1.0) * w
+                           + (shape - 1.0) * abs(w) ** exponent)]
+
+        w = solve_ivp(slope, (u, end), [w], rtol=1e-10, atol=1e-12).y[0, -1]
+        u = end
+        assert operator.step(u) == pytest.approx(0.4 + 0.3 * u + 2.0 * w, abs=1e-7)
+
+
+def test_exponent_one_is_an_exponential():
+    operator = BoucWen(0.0, 1.0, 2.0, 0.5, 1.0, 0.0, 0.0, 9.0)
+    # From w = -1: straight to 0 with sigma = 1/2, then 1 - exp(-rho u).
+    assert operator.step(0.5) == pytest.approx(0.0, abs=1e-14)
+    assert operator.step(1.5) == pytest.approx(1.0 - math.exp(-2.0), abs=1e-14)
+    # Close to saturation and on into it, where the series around the pole takes over.
+    assert operator.step(5.5) == pytest.approx(1.0 - math.exp(-10.0), abs=1e-14)
+    assert operator.step(9.0) == pytest.approx(1.0 - math.exp(-17.0), abs=1e-14)
+
+
+@pytest.mark.parametrize('exponent', [1.0, 1.5, 2.0, 6.0])
+def test_sampling_of_a_ramp_makes_no_difference(exponent):
+    once, often = example(exponent=exponent), example(exponent=exponent)
+    for end in (2.5, -1.0, 1.0, 3.0):
+        for u in np.linspace(often.input, end, 300):
+            often.step(u)
+        assert once.step(end) == pytest.approx(often.step(end), abs=1e-11)
+
+
+@settings(deadline=None, max_examples=50, derandomize=True)
+@given(st.lists(st.floats(-2.5, 3.5), max_size=8), st.floats(0.0, 1.0),
+       st.sampled_from([1.0, -1.0]), st.sampled_from([1.0, 1.7, 3.0]))
+def test_inverse_gives_the_reference_that_can_be_reached(inputs, share, sign, exponent):
+    operator = example(sign * 0.3, sign * 2.0, exponent=exponent)
+    for u in inputs:
+        operator.step(u)
+    low, high = sorted((operator.peek(-2.0), operator.peek(3.0)))
+    full = operator.output_range[1] - operator.output_range[0]
+    y = low + share * (high - low)
+    found = operator.invert(y)
+    assert operator.peek(found.input) == found.output
+    assert abs(found.output - y) < 1e-11 * full
+    assert not found.saturated
+    for beyond, end in ((high + 0.1, high), (low - 0.1, low)):
+        found = operator.invert(beyond)
+        assert found.saturated and found.output == pytest.approx(end, abs=1e-11 * full)
+    for increasing in (True, False):
+        branch = operator.branch(increasing)
+        level = branch.values[0] + share * (branch.values[-1] - branch.values[0])
+        assert branch.value(branch.inverse(level)) == pytest.approx(level, abs=1e-11 * full)
+
+
+def test_branch_is_what_the_operator_follows():
+    operator = example()
+    operator.step(1.0)
+    rising, falling = operator.branch(True), operator.branch(False)
+    expected = {u: operator.peek(u) for u in np.linspace(-2.0, 3.0, 21)}
+    operator.step(-1.0)
+    for u, y in expected.items():
+        assert (rising if u >= 1.0 else falling).value(u) == y
+    assert rising.value(0.0) == expected[1.0]
+    for branch, u in ((rising, 1.5), (falling, 0.2)):
+        numeric = (branch.value(u + 1e-5) - branch.value(u - 1e-5)) / 2e-5
+        assert branch.slope(u) == pytest.approx(numeric, abs=1e-6)
+    assert rising.inverse([-9.0, 9.0]).tolist() == [1.0, 3.0]
+    assert falling.inverse([-9.0, 9.0]).tolist() == [-2.0, 1.0]
+
+
+def test_nothing_but_numbers_comes_out():
+    operator = example()
+    y = operator.step(1.0)
+    assert operator.step(math.nan) == y and operator.saturated
+    assert operator.peek(math.nan) == y
+    for bad in (math.nan, math.inf, -math.inf):
+        assert operator.invert(bad) == (1.0, y, True)
+    assert operator.step(math.inf) == operator.step(3.0)
+    assert np.all(np.isfinite(operator.simulate([-math.inf, math.nan, 1.0, math.inf, 1e308])))
+    assert operator.invert(1e300).saturated
+    for steep in (BoucWen(0.0, 1.0, 1e100, 100.0, 100.0, 0.0, -1e50, 1e50),
+                  BoucWen(0.0, 1.0, 1e-100, 100.0, 1.0, 0.0, -1.0, 1.0)):
+        for u in (0.5, -0.3, 0.31, 0.2):
+            assert -1.0 <= steep.step(u) <= 1.0
+            assert math.isfinite(steep.invert(0.1).output)
+
+
+def test_without_stiffness_saturation_is_a_plateau():
+    operator = BoucWen(0.0, 1.0, 50.0, 0.5, 1.0, 0.0, 0.0, 9.0)
+    operator.step(8.0)
+    assert operator.output == 1.0
+    assert operator.invert(1.0) == (8.0, 1.0, False)
+    assert operator.step(9.0) == 1.0
+    flat = BoucWen(0.0, 0.0, 1.0, 0.5, 1.0, 0.7, 0.0, 9.0)
+    assert flat.invert(0.7) == (0.0, 0.7, False)
+    assert flat.invert(1.0) == (0.0, 0.7, True)
+
+
+@pytest.mark.parametrize('change, message', [
+    ({'stiffness': -0.1}, 'both signs'),
+    ({'rate': 0.0}, 'above 0'),
+    ({'shape': 0.4}, 'at least 0.5'),
+    ({'shape': 1e9}, 'at most 100'),
+    ({'exponent': 0.9}, '1 to 100'),
+    ({'upper': -3.0}, 'not below'),
+    ({'gain': 1e101}, 'another unit'),
+    ({'gain': math.inf}, 'finite'),
+])
+def test_parameters_that_make_no_sense_are_refused(change, message):
+    good = example().to_dict()
+    with pytest.raises(ParameterError, match=message):
+        operator_from_dict({**good, **change})
+
+
+def test_memory_and_parameters_come_back():
+    operator = example()
+    operator.simulate([1.0, -1.0, 2.0, 0.7])
+    twin = operator_from_dict(json.loads(json.dumps(operator.to_dict())))
+    twin.restore(json.loads(json.dumps(operator.save())))
+    assert twin.output == operator.output and twin.direction == -1.0
+    assert twin.step(1.3) == operator.step(1.3)
+    before = operator.save()
+    for change in ({'state': 1.5}, {'state': math.nan}, {'input': 4.0}, {'kind': 'play'}):
+        with pytest.raises(ParameterError):
+            operator.restore({**before, **change})
+    assert operator.save() == before
+    operator.reset()
+    assert operator.save() == example().save()
