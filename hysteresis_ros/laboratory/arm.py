@@ -17,19 +17,20 @@ from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.linkage import GEOMETRY, HIGHEST_ANGLE, LOWEST_ANGLE
 from hysteresis_ros.laboratory.muscle import Muscle
-from hysteresis_ros.laboratory.solve import increasing_root
+from hysteresis_ros.laboratory.solve import RootFinder
 
 __all__ = ['Arm', 'GEOMETRY']
 
 LENGTH_TOLERANCE = 1e-7
-MOMENT_TOLERANCE = 2e-6
+MOMENT_TOLERANCE = 2e-5
 # Steps in time [s] where the temperature feeds back on itself, and where the arm has inertia.
 COUPLED_STEP = 0.5
 SETTLING_STEP = 1.0
 INERTIAL_STEP = 0.02
 # Damping of the wires' own, over the critical one, where nothing else damps the arm.
 INNER_DAMPING = 0.03
-TYPICAL_STIFFNESS = 4.0
+# About how stiff the arm is [N m/rad], and how far the wires go with its angle [m/rad].
+TYPICAL_STIFFNESS, TYPICAL_LEVER = 4.0, 0.025
 
 
 class Arm:
@@ -65,6 +66,10 @@ class Arm:
         coupled = (conditions.heat.latent or conditions.resistance_growth or conditions.viscous
                    or conditions.disturbances or conditions.creep)
         self._settling_step = SETTLING_STEP if coupled else math.inf
+        if len(self.muscle.wires) == 1:
+            self._find = RootFinder(TYPICAL_LEVER, LENGTH_TOLERANCE)
+        else:
+            self._find = RootFinder(TYPICAL_STIFFNESS, MOMENT_TOLERANCE)
         self.heat_and_cool()
 
     def heat_and_cool(self) -> None:
@@ -212,16 +217,14 @@ class Arm:
             def tension(theta):
                 return max(needed(theta) / (count * linkage.moment_arm(theta)), 0.0)
 
-            self.angle = increasing_root(
+            self.angle = self._find(
                 lambda theta: linkage.elongation(theta) - wire.elongation(
-                    temperature, tension(theta)),
-                guess, 0.025, LOWEST_ANGLE, highest, LENGTH_TOLERANCE)
+                    temperature, tension(theta)), guess, LOWEST_ANGLE, highest)
             self.tensions = [tension(self.angle)]
         else:
-            self.angle = increasing_root(
-                lambda theta: self._pull(theta) - needed(theta),
-                guess, TYPICAL_STIFFNESS, LOWEST_ANGLE, highest, MOMENT_TOLERANCE)
-            self._pull(self.angle)
+            # The last evaluation, which leaves the tensions behind, is at the angle found.
+            self.angle = self._find(lambda theta: self._pull(theta) - needed(theta),
+                                    guess, LOWEST_ANGLE, highest)
         self.muscle.commit(self.temperature, self.tensions)
 
     def _settle_down(self) -> None:

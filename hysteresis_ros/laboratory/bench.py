@@ -14,15 +14,15 @@ from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.heat import ROOM
 from hysteresis_ros.laboratory.muscle import Muscle
-from hysteresis_ros.laboratory.solve import increasing_root
-from hysteresis_ros.laboratory.wire import LARGEST_TENSION, LENGTH_TOLERANCE
+from hysteresis_ros.laboratory.solve import RootFinder
+from hysteresis_ros.laboratory.wire import (
+    LARGEST_TENSION, LENGTH_TOLERANCE, TYPICAL_COMPLIANCE)
 
 # Stiffness of load cell, capstan and servo motor [N/m].
 BENCH_STIFFNESS = 5e3
 HOLD = 30.0
 # Steps in time [s] where something changes during a hold.
 CREEPING_STEP = 1.0
-TYPICAL_COMPLIANCE = 4e-4
 
 
 class Bench:
@@ -59,13 +59,14 @@ class Bench:
             Readings of the load cell at the end of each step [N].
         """
         wire, pretension = self._muscle.wires[0], self.conditions.material.pretension
+        find = RootFinder(TYPICAL_COMPLIANCE, LENGTH_TOLERANCE)
 
         def clamped(temperature, before):
             # The wire is clamped at the resting length under its pretension; the bench gives.
-            return increasing_root(
+            return find(
                 lambda force: wire.elongation(temperature, force)
                 + (force - pretension) / BENCH_STIFFNESS,
-                before, TYPICAL_COMPLIANCE, 0.0, LARGEST_TENSION, LENGTH_TOLERANCE)
+                before, 0.0, LARGEST_TENSION)
         return np.array([sensors.load_cell(force, self._chance)
                          for force in self._hold(voltages, hold, clamped, pretension)])
 

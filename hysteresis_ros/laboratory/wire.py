@@ -19,12 +19,14 @@ import math
 import numpy as np
 
 from hysteresis_ros.laboratory.grains import GrainDistribution, Grains
-from hysteresis_ros.laboratory.solve import increasing_root
+from hysteresis_ros.laboratory.solve import RootFinder
 
 # Largest tension considered [N]; far above what any bench or arm here asks for.
 LARGEST_TENSION = 60.0
 # Elongations count as equal below this [m].
-LENGTH_TOLERANCE = 2e-8
+LENGTH_TOLERANCE = 5e-8
+# About how much a wire stretches [m/N].
+TYPICAL_COMPLIANCE = 4e-4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,6 +139,7 @@ class Wire:
         self._shift = 1.0 / (material.section * material.clausius_clapeyron)
         self._cooling_shift = self._shift / material.cooling_ratio
         self._early_shift = 1.0 / (material.section * material.early_clausius_clapeyron)
+        self._find = RootFinder(TYPICAL_COMPLIANCE, LENGTH_TOLERANCE)
         self._rest = material.strain(1.0, 1.0, material.pretension / material.section)
         self.heat_and_cool()
 
@@ -216,12 +219,8 @@ class Wire:
         float
             Zero where the wire hangs loose: it cannot push.
         """
-        # The elastic stiffness is the least slope that the function can have.
-        material = self.material
-        slope = material.resting_length / (material.section * material.austenite_modulus)
-        return increasing_root(
-            lambda force: self.elongation(temperature, force) - elongation,
-            guess, 2.0 * slope, 0.0, LARGEST_TENSION, LENGTH_TOLERANCE)
+        return self._find(lambda force: self.elongation(temperature, force) - elongation,
+                          guess, 0.0, LARGEST_TENSION)
 
     def _length(self, martensite: float, early: float, tension: float) -> float:
         material = self.material
