@@ -23,8 +23,8 @@ from hysteresis_ros.errors import HysteresisError
 from hysteresis_ros.nodes.qos import COMMANDS
 
 ANGLES = 1.7, 2.4           # rad, within reach of the bicep
-BLOCKS = 20
-BLOCK = 100                 # messages of one chain before the next has its turn
+BLOCKS = 300
+BLOCK = 10                  # messages of one chain before the next has its turn
 RATE, SECONDS = 500, 60.0   # targets a second, and for how long
 PATIENCE = 20.0             # s for a chain to come up, or for a message to come through
 
