@@ -168,9 +168,21 @@ class RPhase(MaterialEffect):
         """Return the strain of the step, with a small play as its hysteresis."""
         half = 0.5 * self.LOOP * surroundings.heat
         self._played = min(max(self._played, heat - half), heat + half)
-        argument = (self._played / surroundings.heat - self.position) / self.width
-        step = 0.5 * (1.0 + math.tanh(0.5 * argument))
-        return surroundings.sign * self.strain / 100.0 * surroundings.length * step, 1.0
+        return float(self._strain(self._played, surroundings)), 1.0
+
+    def drift(self, drive, heat, inputs, surroundings):
+        """Return the same for a whole trial at once."""
+        half = 0.5 * self.LOOP * surroundings.heat
+        played, state = [], 0.0
+        for value in heat.tolist():
+            state = min(max(state, value - half), value + half)
+            played.append(state)
+        return self._strain(np.array(played), surroundings), np.ones(len(drive))
+
+    def _strain(self, heat, surroundings):
+        argument = (heat / surroundings.heat - self.position) / self.width
+        step = 0.5 * (1.0 + np.tanh(0.5 * argument))
+        return surroundings.sign * self.strain / 100.0 * surroundings.length * step
 
 
 class Creep(MaterialEffect):

@@ -151,8 +151,8 @@ class LatentHeat(FirstOrderLag):
     parameters = (
         Parameter('time_constant', 's', 'time constant 1/d1 outside the transformation', 1.0, 10.0,
                   0.0, (2.0, 5.0), log=True),
-        Parameter('latent', '1', 'h: latent heat over the heat stored at full drive', 0.05, 1.0, 0.0,
-                  (0.2, 0.5), log=True),)
+        Parameter('latent', '1', 'h: latent heat over the heat stored at full drive', 0.05, 1.0,
+                  0.0, (0.2, 0.5), log=True),)
 
     def step(self, value, step, phase, surroundings):
         """Advance with what the change of phase gives off."""

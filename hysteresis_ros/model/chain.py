@@ -8,6 +8,8 @@ two time constants contains one with a single time constant) takes its place.
 """
 
 from collections.abc import Sequence
+import copy
+import math
 
 import numpy as np
 
@@ -40,7 +42,8 @@ class Chain:
     """
 
     def __init__(self, effects: Sequence[Effect], surroundings: Surroundings):
-        ordered = in_order(effects)
+        # Copies, because what an effect remembers of the past belongs to one chain.
+        ordered = [copy.copy(effect) for effect in in_order(effects)]
         self.surroundings = surroundings
         # Voltage and current heat with their square (Eq. 2).
         self.squared = surroundings.drive in ELECTRIC_DRIVES
@@ -52,10 +55,21 @@ class Chain:
         self.sensor = [e for e in ordered if isinstance(e, SensorEffect)]
         self.needs_phase = any(effect.needs_phase for effect in drive)
         # A fan changes gain and time constant together (d1 stands in both).
-        for lag in self.thermal:
-            if hasattr(lag, 'speed'):
-                lag.speed = float(np.prod([getattr(effect, 'beta', 1.0)
-                                           for effect in self.thermal]))
+        for effect in self.thermal:
+            effect.speed = math.prod(other.exchange for other in self.thermal)
+        self.start()
+
+    @property
+    def offsets(self) -> tuple:
+        """Excess length [m] of each parallel muscle."""
+        return next((e.offsets for e in self.material if len(e.offsets) > 1), (0.0,))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether time or history add to the elongation."""
+        return any(type(effect).drift is not MaterialEffect.drift
+                   or type(effect).advance is not MaterialEffect.advance
+                   for effect in self.material)
 
     def to_heat(self, drive):
         """Return what the drive heats with: its square, with the sign kept, or itself."""
@@ -76,9 +90,28 @@ class Chain:
         return signal
 
     def start(self) -> None:
-        """Make the stages with memory forget it."""
-        for effect in self.electrical + self.thermal + self.sensor:
+        """Make the effects with a past forget it."""
+        for effect in self._all():
             effect.start()
+
+    def save(self) -> list:
+        """Return what the effects remember of the past, as plain types."""
+        return [effect.save() for effect in self._all()]
+
+    def restore(self, state: list) -> None:
+        """
+        Take back what `save` returned.
+
+        Raises
+        ------
+        KeyError, ValueError
+            If it was saved with other effects.
+        """
+        for effect, entry in zip(self._all(), state, strict=True):
+            effect.restore(entry)
+
+    def _all(self):
+        return [*self.electrical, *self.thermal, *self.material, *self.mechanism, *self.sensor]
 
     def step(self, drive: float, inputs: Inputs) -> float:
         """Return the heat after one sample of the drive, for a model that runs along."""
@@ -91,6 +124,7 @@ class Chain:
         return signal
 
     def _advance(self, effect: DriveEffect, signal: float, inputs: Inputs) -> float:
+        # One without a past may look at all inputs, such as the ambient temperature.
         if type(effect).step is DriveEffect.step:
             return float(effect.forward(signal, inputs, self.surroundings))
         return effect.step(signal, inputs.step, inputs.phase, self.surroundings)
@@ -107,7 +141,7 @@ class Chain:
 
     def load_per_heat(self) -> float:
         """Return C of `stress_dependence`, or 0 where the first stage is the model's own."""
-        return sum(getattr(effect, 'load_per_heat', 0.0) for effect in self.material)
+        return sum(effect.load_per_heat for effect in self.material)
 
     def load_inside(self, load):
         """Return the load as the transformation feels it."""
@@ -130,6 +164,14 @@ class Chain:
         offset, factor = np.zeros(len(drive)), np.ones(len(drive))
         for effect in self.material:
             added, times = effect.drift(drive, heat, inputs, self.surroundings)
+            offset, factor = offset + added, factor * times
+        return offset, factor
+
+    def advance(self, drive: float, heat: float, inputs: Inputs) -> tuple[float, float]:
+        """Return offset and factor of the next row, for a model that runs along."""
+        offset, factor = 0.0, 1.0
+        for effect in self.material:
+            added, times = effect.advance(drive, heat, inputs, self.surroundings)
             offset, factor = offset + added, factor * times
         return offset, factor
 
