@@ -7,7 +7,8 @@ The muscle stretches to ``L = L0 + S(F) f (H2[u] - L0) + e(F) + o`` with ``u = F
 the first stage's output (H1[V] in the paper's model) and F is what the arm asks for at its angle.
 At rest ``L(theta) = H2[F(theta) - x]``; the unknown is u, because H2 then gives everything else.
 Dry friction lets F lie in a band, inside which the arm sticks; viscous friction and inertia add
-what the present velocity and acceleration cost (implicit Euler).
+what the present velocity and acceleration cost (implicit Euler). S and e take the F of the arm at
+rest, without what resists its motion.
 """
 
 import bisect
@@ -15,19 +16,18 @@ import copy
 import math
 
 import numpy as np
-from scipy import optimize
 
+from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.effects.base import Statics
 
-GRID = math.radians(0.25)
+# Between two angles of the grid the linkage is a straight line, which costs less than 1e-6 rad.
+GRID = math.radians(0.1)
 # A step longer than this is a settled state to which dynamics contribute nothing.
 LONGEST_TRANSIENT = 5.0
 # Longest step for which implicit Euler still shows an arm that rings (its period is about 1 s).
 LONGEST_INERTIAL_STEP = 0.02
 MOST_ITERATIONS = 60
-# Force per elongation [N/m] of a wire that is wholly in one phase.
-ELASTICITY = 5e3
 
 
 class ArmBalance:
@@ -42,36 +42,40 @@ class ArmBalance:
         The linkage.
     chain : Chain
         Effects of the model: those of the material and of the mechanism count here.
-    offsets : tuple of float
-        Excess length [m] of each parallel muscle; the default is equal muscles.
+    loaded : bool
+        Whether the load counts; not in a model without a first stage to weigh it against.
     """
 
-    def __init__(self, operator, geometry: BicepGeometry, chain, offsets=(0.0,)):
+    def __init__(self, operator, geometry: BicepGeometry, chain, loaded: bool = True):
         low, high = geometry.angle_range
         theta = np.linspace(low, high, max(int((high - low) / GRID), 2))
-        statics = Statics(theta, geometry.length(theta), geometry.moment_arm(theta),
-                          geometry.load_moment(theta))
+        statics = Statics.of(geometry, theta)
         for effect in chain.mechanism:
             statics = effect.forward(statics, geometry)
         resistances = [effect.resistance() for effect in chain.mechanism]
-        coulomb, self.viscous, self.inertia = (
+        self.coulomb, self.viscous, self.inertia = (
             sum(values) for values in zip((0.0, 0.0, 0.0), *resistances))
         leverage = geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6)
         # A wire cannot push.
         force = np.maximum(statics.moment / leverage, 0.0)
-        self.operators = [copy.deepcopy(operator) for _ in offsets]
-        self.offsets = offsets
+        load, weight = 0.0 * force, 0.0 * force
+        if loaded:
+            load = chain.load_inside(force)
+            weight = chain.load_inside(force + 1.0) - load
         self.base = operator.output_range[0]
-        demand = (statics.length - self.base - chain.stretch(force)) / chain.scale(force)
+        scale = chain.scale(force) + 0.0 * force
+        demand = (statics.length - self.base - chain.stretch(force)) / scale
+        self._theta = theta.tolist()
         # Past a fold, where the arm would fall, the nearest stable state is kept.
-        self.demand = np.maximum.accumulate(demand).tolist()
-        self.theta = theta.tolist()
-        self.load = (chain.load_inside(force)).tolist()
-        self.friction = (coulomb / leverage).tolist()
-        self.leverage = leverage.tolist()
-        self.has_friction = coulomb > 0.0
+        self._demand = np.maximum.accumulate(demand).tolist()
+        self._strain = None if np.all(scale == 1.0) else (1.0 / scale).tolist()
+        self._load = load.tolist()
+        # What a moment that resists motion changes in the load.
+        self._resist = (weight / leverage).tolist()
         self.has_dynamics = self.viscous > 0.0 or self.inertia > 0.0
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
+        self._bundle = Bundle(operator, chain.offsets) if len(chain.offsets) > 1 else None
+        self.operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self.start()
 
     def start(self) -> None:
@@ -81,14 +85,13 @@ class ArmBalance:
         self._gain = 1.5
         self._angle = None
         self._velocity = 0.0
-        self._sliding = 0.0
 
     def settle(self, x: float) -> float:
         """Take up the state of rest under `x`, the cold one, and return its angle [rad]."""
-        friction, self.has_friction = self.has_friction, False
-        self._angle = self.step(x, math.inf)
-        self.has_friction = friction
-        return self._angle
+        friction, self.coulomb = self.coulomb, 0.0
+        angle = self.step(x, math.inf)
+        self.coulomb = friction
+        return angle
 
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0) -> float:
         """
@@ -117,78 +120,91 @@ class ArmBalance:
 
     def _advance(self, x, dt, offset, factor):
         moving = self.has_dynamics and dt < LONGEST_TRANSIENT and self._angle is not None
-        if len(self.operators) > 1:
-            angle = self._solve_bundle(x, offset, factor)
-        else:
-            u = self._solve(x, offset, factor, dt if moving else 0.0)
-            operator = self.operators[0]
-            angle = self._state(factor * (operator.step(u) - self.base) + offset)[0]
-        if moving:
-            self._velocity = (angle - self._angle) / dt
-        else:
-            self._velocity = 0.0
+        if moving and dt <= 0.0:
+            return self._angle
+        solve = self._solve if self._bundle is None else self._solve_bundle
+        demand = solve(x, offset, factor, dt if moving else 0.0)
+        k, share = self._place(demand, offset)
+        angle = self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
+        self._velocity = (angle - self._angle) / dt if moving else 0.0
         self._angle = angle
         return angle
 
-    def _state(self, demand: float) -> tuple[float, float, int]:
-        """Angle, load and index on the grid for what the transformation has to give."""
-        grid = self.demand
-        k = bisect.bisect_right(grid, demand)
-        if k == 0:
-            return self.theta[0], self.load[0], 0
-        if k == len(grid):
-            return self.theta[-1], self.load[-1], k - 1
-        below = grid[k - 1]
-        share = (demand - below) / (grid[k] - below)
-        theta, load = self.theta, self.load
-        return (theta[k - 1] + share * (theta[k] - theta[k - 1]),
-                load[k - 1] + share * (load[k] - load[k - 1]), k)
+    def _place(self, demand, offset):
+        """Interval on the grid, and share of it, for what the transformation has to give."""
+        grid, strain = self._demand, self._strain
+        if strain is None or offset == 0.0:
+            demand += offset
+            k = min(max(bisect.bisect_right(grid, demand), 1), len(grid) - 1)
+            below, above = grid[k - 1], grid[k]
+        else:
+            # The offset is not part of the strain that the load scales.
+            k = bisect.bisect_right(range(len(grid)), demand,
+                                    key=lambda row: grid[row] - offset * strain[row])
+            k = min(max(k, 1), len(grid) - 1)
+            below = grid[k - 1] - offset * strain[k - 1]
+            above = grid[k] - offset * strain[k]
+        if demand <= below:
+            return k, 0.0
+        return k, 1.0 if demand >= above else (demand - below) / (above - below)
+
+    def _required(self, demand, offset, drag, dt):
+        """Load that the arm asks for, moving towards `demand` within `dt`."""
+        k, share = self._place(demand, offset)
+        load = self._load[k - 1] + share * (self._load[k] - self._load[k - 1])
+        if drag or dt:
+            moment = drag * self.coulomb
+            if dt:
+                theta = self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
+                speed = (theta - self._angle) / dt
+                moment += self.viscous * speed + self.inertia * (speed - self._velocity) / dt
+            load -= moment * (
+                self._resist[k - 1] + share * (self._resist[k] - self._resist[k - 1]))
+        return load
+
+    def _drag(self, demand, offset, lacking):
+        """Direction in which the arm slides, 0 if friction holds it; `lacking` is its want."""
+        k, share = self._place(demand, offset)
+        resist = self._resist[k - 1] + share * (self._resist[k] - self._resist[k - 1])
+        return 0.0 if abs(lacking) <= self.coulomb * resist else math.copysign(1.0, lacking)
 
     def _solve(self, x, offset, factor, dt):
-        """Find u with load(theta(H2[u])) - x - u = 0 next to the present one."""
+        """Commit the u next to the present one with load(theta(H2[u])) - x - u = 0."""
         operator, base, tolerance = self.operators[0], self.base, self.tolerance
-        peek, state = operator.peek, self._state
-        angle, velocity = self._angle, self._velocity
+        peek, required = operator.peek, self._required
+        drag = 0.0
 
-        def residual(u, drag):
-            theta, load, k = state(factor * (peek(u) - base) + offset)
-            if drag:
-                load -= drag * self.friction[k]
-            if dt:
-                speed = (theta - angle) / dt
-                load -= (self.viscous * speed
-                         + self.inertia * (speed - velocity) / dt) / self.leverage[k]
-            return load - x - u
+        def residual(u):
+            return required(factor * (peek(u) - base), offset, drag, dt) - x - u
 
         u = operator.input
-        drag = 0.0
-        here = residual(u, 0.0)
-        if self.has_friction:
-            band = self.friction[state(factor * (operator.output - base) + offset)[2]]
-            if abs(here) <= band:
-                return u
-            drag = math.copysign(1.0, here)
-            here = residual(u, drag)
-        if abs(here) <= tolerance:
-            return u
+        here = residual(u)
+        if self.coulomb > 0.0:
+            drag = self._drag(factor * (operator.output - base), offset, here)
+            here = residual(u) if drag else 0.0
+        if abs(here) > tolerance:
+            operator.step(self._root(residual, u, here))
+        return factor * (operator.output - base)
+
+    def _root(self, residual, u, here):
         # The residual falls with u: go the way of its sign until it changes.
         first, initial = u, here
         step = here * self._gain
         far = u + step
-        there = residual(far, drag)
+        there = residual(far)
         for _ in range(MOST_ITERATIONS):
             if there * here <= 0.0:
                 break
             u, here = far, there
             step *= 2.0
             far = u + step
-            there = residual(far, drag)
+            there = residual(far)
         # Illinois: false position that cannot stall at one end.
         for _ in range(MOST_ITERATIONS):
-            if abs(there) <= tolerance or there == here:
+            if abs(there) <= self.tolerance or there == here:
                 break
             middle = far - there * (far - u) / (there - here)
-            value = residual(middle, drag)
+            value = residual(middle)
             if value * there < 0.0:
                 u, here = far, there
             else:
@@ -197,30 +213,31 @@ class ArmBalance:
         self._gain = min(max((far - first) / initial, 0.5), 10.0)
         return far
 
-    def _solve_bundle(self, x, offset, factor):
-        """Balance muscles of unequal length, each with a memory of its own."""
-        grid = self.demand
+    def _solve_bundle(self, x, offset, factor, dt):
+        """Commit the elongation in which muscles of unequal length balance the arm."""
+        bundle, base, grid = self._bundle, self.base, self._demand
+        drag = 0.0
 
-        def tension(operator, output):
-            """Input of one muscle; beyond saturation only the wire's elasticity gives way."""
-            found = operator.invert(output)
-            return found.input + ELASTICITY * (output - found.output)
+        def required(output):
+            return self._required(factor * (output - base), offset, drag, dt)
 
-        def residual(demand):
-            output = (demand - offset) / factor + self.base
-            self._inputs = [tension(operator, output - excess)
-                            for operator, excess in zip(self.operators, self.offsets)]
-            mean = sum(max(u + x, 0.0) for u in self._inputs) / len(self._inputs)
-            return mean - self._state(demand)[1]
+        room = abs(offset) * max(self._strain or [1.0])
+        low, high = base + (grid[0] - room) / factor, base + (grid[-1] + room) / factor
+        present = high if self._angle is None else base + self._present(offset) / factor
+        if self.coulomb > 0.0:
+            here = required(present) - bundle.share(bundle.inputs(present), x)
+            drag = self._drag(factor * (present - base), offset, here)
+            if drag == 0.0:
+                return factor * (present - base)
+        output = bundle.settle(required, x, low, high, present)
+        bundle.step(bundle.inputs(output))
+        return factor * (output - base)
 
-        near = grid[0] if self._angle is None else float(
-            np.interp(self._angle, self.theta, grid))
-        here = residual(near)
-        far = grid[0] if here > 0.0 else grid[-1]
-        there = residual(far)
-        if here * there < 0.0:
-            far = optimize.brentq(residual, near, far, xtol=1e-10)
-            residual(far)
-        for operator, u in zip(self.operators, self._inputs):
-            operator.step(u)
-        return self._state(far)[0]
+    def _present(self, offset):
+        """What the transformation gives at the present angle."""
+        demand = float(np.interp(self._angle, self._theta, self._demand))
+        if offset != 0.0:
+            strain = 1.0 if self._strain is None else float(
+                np.interp(self._angle, self._theta, self._strain))
+            demand -= offset * strain
+        return demand
