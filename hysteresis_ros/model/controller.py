@@ -2,20 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """The inverse that drives the muscle: Eqs. 12 to 14, and every effect that can be undone."""
 
+from collections.abc import Mapping
 import copy
 import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy import optimize
 
 from hysteresis_ros.bicep.geometry import Reference
 from hysteresis_ros.effects import Inputs, Statics
-from hysteresis_ros.effects.thermal import FirstOrderLag
 from hysteresis_ros.errors import ParameterError, RangeError
 from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.muscles import Muscles
 
-# Passes that settle an offset which depends on the drive that is being looked for.
-DRIFT_PASSES = 3
+# Passes that bring a clipped drive into agreement with the phase that it causes.
+PHASE_PASSES = 20
+# Pieces [s] in which a muscle with latent heat is followed on its way.
+PHASE_STEP = 0.1
 
 
 class Setpoint(NamedTuple):
@@ -29,7 +33,8 @@ class Setpoint(NamedTuple):
     saturated : bool
         Whether the reference is out of reach.
     expected : float
-        Length [m] (or force [N]) that the model gives for this drive.
+        Length [m] (or force [N]) that the model gives for this drive; NaN if the reference is no
+        number.
     error : float
         `expected` less the reference.
     reason : str
@@ -43,9 +48,20 @@ class Setpoint(NamedTuple):
     reason: str
 
 
+class Outcome(NamedTuple):
+    """What a drive would do: `length` [m], `heat`, and the inputs of the `muscles`."""
+
+    length: float
+    heat: float
+    muscles: list
+
+
 class Controller:
     """
     The two-stage inverse with memory.
+
+    Effects that cannot be undone (drifts of the room, creep, latency) are left out, so that a
+    controller is never wrong by an effect that it only half knows.
 
     Parameters
     ----------
@@ -59,118 +75,203 @@ class Controller:
     horizon : float
         Time [s] within which a lagging muscle is to reach its heat; it is overdriven meanwhile,
         within the limits. Call `hold` at least this often. Infinite: never overdriven.
+    arm : bool
+        Whether the muscle lifts the model's arm, whose load it bears while it is cold. Else it
+        bears the first reference's force, as on the bench. Calling `reference` says so, too.
+
+    Raises
+    ------
+    ParameterError
+        If the limits make no sense.
     """
 
+    # What is remembered beside the operators and the effects.
+    _MEMORY = ('_fresh', '_arm', '_voltage', '_travel', '_angle', '_direction', '_time', '_period',
+               '_deadline', '_target', '_felt', '_start', '_phase', '_phase_before', '_ambient')
+
     def __init__(self, model, voltage_limits=None, dead_band: float = 0.0,
-                 horizon: float = math.inf):
+                 horizon: float = math.inf, arm: bool = False):
         self.model = model
-        surroundings = model.surroundings
-        self._chain = model.chain()
-        self._steady = Chain([effect for effect in model.effects
-                              if not isinstance(effect, FirstOrderLag)], surroundings)
-        self._length = (model.require_length_stage() if model.length_stage is not None else None)
-        self._first = model.first_stage(self._chain)
-        self._force = copy.deepcopy(model.force_stage)
         self.limits = tuple(voltage_limits or model.ranges.get(model.drive, (0.0, math.inf)))
+        if not self.limits[0] < self.limits[1]:
+            raise ParameterError(f'the drive limits {self.limits} have to be a lower and an upper')
         self.dead_band = dead_band
         self.horizon = horizon
+        usable = [effect for effect in model.effects
+                  if effect.invertible or effect.stage in ('mechanism', 'sensor')]
+        self._chain = Chain(usable, model.surroundings)
+        self._steady = Chain([effect for effect in usable if not effect.needs_transients],
+                             model.surroundings)
+        self._first = model.first_stage(self._chain)
+        self._force = copy.deepcopy(model.force_stage)
+        self._muscles = (None if model.length_stage is None else
+                         Muscles(model.require_length_stage(), model.sign, self._chain.offsets))
+        self._rest = None
+        self._travel = 0.0
+        self._arm = arm
         self.reset()
 
     def reset(self) -> None:
-        """Forget the history: the muscle was heated and cooled."""
+        """Forget the history: the muscle was heated and cooled. What has worn it stays."""
         cold = self.model.cold_drive
         self._chain.start()
         self._steady.start()
-        self._heat = float(self._chain.to_heat(cold))
+        heat = float(self._chain.to_heat(cold))
         self._first.reset()
-        x = self._first.step(self._heat)
-        if self._length is not None:
-            self._length.reset()
-            self._cold = x
+        self._cold = self._first.step(heat)
+        if self._muscles is not None:
+            self._muscles.reset()
         if self._force is not None:
             self._force.reset()
             self._force.step(cold)
         self._fresh = True
-        self._time = None
         self._voltage = cold
-        self._travel = 0.0
-        self._angle = None
-        self._direction = 0.0
-        self._target_heat = self._heat
+        self._angle = self._time = self._felt = self._ambient = None
+        self._direction = self._period = self._deadline = 0.0
+        self._target = self._start = heat
+        self._phase = self._phase_before = 1.0
 
     def save(self) -> dict:
-        """Return the memory as plain types."""
+        """Return the memory as plain types, fit for JSON and YAML."""
         return {'first': self._first.save(),
-                'length': self._length.save() if self._length is not None else None,
+                'muscles': self._muscles.save() if self._muscles is not None else None,
                 'force': self._force.save() if self._force is not None else None,
-                'fresh': self._fresh, 'voltage': self._voltage, 'travel': self._travel,
-                'angle': self._angle, 'direction': self._direction}
+                'effects': [self._chain.save(), self._steady.save()],
+                **{name.strip('_'): getattr(self, name) for name in self._MEMORY}}
 
-    def restore(self, state: dict) -> None:
+    def restore(self, state: Mapping) -> None:
         """
         Take a saved memory back.
 
         Raises
         ------
         ParameterError
-            If it was saved by another model.
+            If it is damaged or was saved by another model; the memory stays as it was.
         """
-        self.reset()
+        before = self.save()
         try:
-            self._first.restore(state['first'])
-            if self._length is not None:
-                self._length.restore(state['length'])
-            if self._force is not None:
-                self._force.restore(state['force'])
-            self._fresh = bool(state['fresh'])
-            self._voltage, self._travel = float(state['voltage']), float(state['travel'])
-            self._angle, self._direction = state['angle'], float(state['direction'])
-        except (KeyError, TypeError, ValueError) as error:
-            self.reset()
+            self._take(state)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            self._take(before)
             raise ParameterError(f'saved memory does not fit the model ({error})') from None
+
+    def _take(self, state):
+        self._first.restore(state['first'])
+        if self._muscles is not None:
+            self._muscles.restore(state['muscles'])
+        if self._force is not None:
+            self._force.restore(state['force'])
+        for chain, entry in zip((self._chain, self._steady), state['effects'], strict=True):
+            chain.restore(entry)
+        for name in self._MEMORY:
+            value = state[name.strip('_')]
+            if value is not None and not math.isfinite(value):
+                raise ValueError(f'{name.strip("_")} is {value}')
+            setattr(self, name, value)
 
     def reference(self, theta: float) -> Reference:
         """
-        Elongation and force for a target angle [rad], effects of arm and sensor undone.
+        Elongation and force for a target angle, effects of arm and sensor undone.
+
+        Friction and backlash make it depend on the target before, so call it once for each.
+
+        Parameters
+        ----------
+        theta : float
+            What the sensor is to measure [rad].
+
+        Returns
+        -------
+        Reference
+            Elongation [m], and tension [N] of one muscle.
 
         Raises
         ------
         RangeError
-            If the linkage cannot take the angle.
+            If the arm cannot be held there; nothing is remembered of that target.
         """
         geometry = self.model.require_geometry()
         geometry.check_angle(theta)
-        true = theta
-        for effect in reversed(self._chain.sensor):
-            true = effect.inverse(true)
-        geometry.check_angle(true)
-        grid = np.array([true])
-        statics = Statics(grid, geometry.length(grid), geometry.moment_arm(grid),
-                          geometry.load_moment(grid))
+        before = self._chain.save()
+        try:
+            true = theta
+            for effect in reversed(self._chain.sensor):
+                true = effect.inverse(true)
+            geometry.check_angle(true)
+            found = self._reference(geometry, theta, true)
+        except RangeError:
+            self._chain.restore(before)
+            raise
+        self._arm = True
+        return found
+
+    def _reference(self, geometry, theta, true):
+        statics = Statics.of(geometry, np.array([true]))
         for effect in self._chain.mechanism:
             statics = effect.forward(statics, geometry)
         leverage = geometry.muscle_count * float(statics.moment_arm[0])
+        moment = float(statics.moment[0])
         if leverage <= 0.0:
             raise RangeError(f'target angle {theta:.4f} rad lies beyond a dead centre of the arm')
+        if moment < 0.0:
+            raise RangeError(f'nothing pulls the arm to the target angle {theta:.4f} rad; the '
+                             'muscle would have to push')
         friction = sum(effect.resistance()[0] for effect in self._chain.mechanism)
-        if self._angle is not None and true != self._angle:
-            self._direction = math.copysign(1.0, true - self._angle)
+        if friction > 0.0:
+            start = self._at_rest()[0] if self._angle is None else self._angle
+            if true != start:
+                self._direction = math.copysign(1.0, true - start)
         self._angle = true
-        moment = float(statics.moment[0]) - self._direction * friction
-        return Reference(float(statics.length[0]), max(moment / leverage, 0.0))
+        force = max(moment - self._direction * friction, 0.0) / leverage
+        return Reference(float(statics.length[0]), force)
 
-    def force_setpoint(self, force: float, commit: bool = True) -> Setpoint:
-        """Return the drive for a force [N] at resting length (Eq. 12)."""
+    def _at_rest(self):
+        """Angle of the cold arm, and what its muscles' memories start from."""
+        if self._rest is None:
+            balance = self.model.balance(self.model.chain())
+            angle = balance.settle(self._cold)
+            self._rest = angle, [operator.input for operator in balance.operators]
+        return self._rest
+
+    def force_setpoint(self, force: float, commit: bool = True,
+                       ambient: float = math.nan) -> Setpoint:
+        """
+        Return the drive for a force at resting length (Eq. 12).
+
+        Parameters
+        ----------
+        force : float
+            Reference F_d [N].
+        commit : bool
+            Whether it will be applied, so that the memory has to follow.
+        ambient : float
+            Ambient temperature [degC], NaN if unknown.
+
+        Returns
+        -------
+        Setpoint
+            Nearest possible drive; saturated if the reference is out of reach or not finite.
+
+        Raises
+        ------
+        ParameterError
+            If the model has no force stage.
+        """
         if self._force is None:
             raise ParameterError('the model has no force stage; identify it with --force F.csv')
+        if not math.isfinite(force):
+            return self._no_number()
         found = self._force.invert(force)
-        inputs = self._inputs(0.0, 1.0, math.nan)
+        low, high = self._force.output_range
+        phase = (high - found.output) / max(high - low, 1e-12)
+        inputs = self._inputs(0.0, phase, ambient)
         drive, clipped = self._clip(self._steady.inverse(
             float(self._chain.to_heat(found.input)), inputs))
         applied = float(self._chain.to_drive(self._steady.step(drive, inputs)))
         expected = self._force.step(applied) if commit else self._force.peek(applied)
+        if commit:
+            self._apply(drive)
         saturated = found.saturated or clipped
-        low, high = self._force.output_range
         reason = (f'force {force:.4g} N is outside {low:.4g} to {high:.4g} N or beyond the drive '
                   'limits' if saturated else '')
         return Setpoint(drive, saturated, expected, expected - force, reason)
@@ -187,7 +288,7 @@ class Controller:
         force : float
             Reference F_d of one muscle [N].
         time : float, optional
-            When it is applied [s]; needed where the model has a lag.
+            When it is applied [s]; needed where a lagging muscle is to be overdriven.
         commit : bool
             Whether it will be applied, so that the memory has to follow.
         ambient : float
@@ -197,92 +298,171 @@ class Controller:
         -------
         Setpoint
             Nearest possible drive; saturated if the reference is out of reach or not finite.
+
+        Raises
+        ------
+        ParameterError
+            If the model has no length stage.
         """
-        if self._length is None:
+        if self._muscles is None:
             raise ParameterError('the model has no length stage; identify it with a length table')
         if not (math.isfinite(length) and math.isfinite(force)):
-            return Setpoint(self._voltage, True, math.nan, math.nan,
-                            'the reference is not a finite number')
+            return self._no_number()
         self._advance(time)
-        operator, sign = self._length, self.model.sign
-        loaded = self._first.loaded
-        inside = float(self._chain.load_inside(np.float64(force))) if loaded else 0.0
+        load = float(self._chain.load_inside(np.float64(force))) if self._first.loaded else 0.0
         if self._fresh:
-            # The cold muscle lengthens under the load before it is first driven.
-            operator.reset()
-            operator.step(sign * (self._cold - inside))
-        base = operator.output_range[0]
-        scale = float(self._chain.scale(np.float64(force)))
-        stretch = float(self._chain.stretch(np.float64(force)))
-        offset, factor = self._drift(self._heat)
-        for _ in range(DRIFT_PASSES if self._chain.material else 1):
-            wanted = base + (length - base - stretch - offset) / (scale * factor)
-            found = operator.invert(wanted, dead_band=self.dead_band)
-            heat, _, first_saturated = self._first.invert(sign * found.input + inside)
-            if not self._chain.material:
-                break
-            offset, factor = self._drift(heat)
-        low, high = operator.output_range
-        phase = (found.output - low) / max(high - low, 1e-12)
-        inputs = self._inputs(0.0, min(max(phase, 0.0), 1.0), ambient)
-        steady, clipped = self._clip(self._steady.inverse(heat, inputs))
-        heat = self._steady.step(steady, inputs)
-        u = sign * (self._first.peek(heat) - inside)
-        output = operator.peek(u)
-        expected = base + scale * factor * (output - base) + stretch + offset
-        drive, _ = self._clip(self._chain.inverse(
-            heat, inputs._replace(step=self.horizon))) if math.isfinite(self.horizon) else (
-                steady, False)
-        saturated = found.saturated or first_saturated or clipped
+            # The cold muscle lengthens under its load before it is first driven.
+            self._muscles.settle_cold(self._cold, load, self._at_rest()[1] if self._arm else None)
+        phase = float(self.model.martensite(length))
+        inputs = self._inputs(0.0, phase, ambient)
+        find = self._search if self._steady.drifts else self._invert
+        drive, saturated = find(length, force, load, inputs)
+        outcome = self._outcome(drive, force, load, inputs)
+        if saturated and self._chain.needs_phase:
+            for _ in range(PHASE_PASSES):
+                phase = float(self.model.martensite(outcome.length))
+                inputs = inputs._replace(phase=phase)
+                outcome = self._outcome(drive, force, load, inputs)
+        applied = drive
         if commit:
-            self._first.step(heat)
-            operator.step(u)
-            self._fresh = False
-            self._travel += abs(steady - self._voltage)
-            self._voltage, self._heat, self._target_heat = drive, heat, heat
+            applied = self._commit(drive, outcome, inputs, time)
+        elif time is not None and math.isfinite(self.horizon):
+            applied = self._towards(outcome.heat, phase, self.horizon)
         reason = ''
         if saturated:
             limits = f'{self.limits[0]:.4g} to {self.limits[1]:.4g}'
             reason = (f'length {1e3 * length:.3f} mm under {force:.3f} N is out of reach within '
-                      f'{limits} {self.model.drive}; expected {1e3 * expected:.3f} mm')
-        return Setpoint(drive, saturated, expected, expected - length, reason)
+                      f'{limits} {self.model.drive}; expected {1e3 * outcome.length:.3f} mm')
+        return Setpoint(applied, saturated, outcome.length, outcome.length - length, reason)
+
+    def _invert(self, length, force, load, inputs):
+        """Drive in closed form, and whether it is out of reach."""
+        base = self._muscles.base
+        scale = float(self._chain.scale(np.float64(force)))
+        wanted = base + (length - base - float(self._chain.stretch(np.float64(force)))) / scale
+        x, out_of_reach = self._muscles.drive(wanted, load, self.dead_band)
+        heat, saturated = self._first.invert(x)
+        drive, clipped = self._clip(self._steady.inverse(heat, inputs))
+        return drive, out_of_reach or saturated or clipped
+
+    def _search(self, length, force, load, inputs):
+        """Drive by a search: the offset of time and use depends on the drive that is sought."""
+        low, high = self.limits
+        if not math.isfinite(high):
+            high = float(self._chain.to_drive(self._chain.surroundings.heat))
+
+        def error(drive):
+            return self.model.sign * (
+                self._outcome(drive, force, load, inputs).length - length)
+
+        here = error(self._voltage) if low <= self._voltage <= high else math.inf
+        if abs(here) <= self.dead_band:
+            return self._voltage, False
+        margin = 1e-9 * self._chain.surroundings.span
+        at_low, at_high = error(low), error(high)
+        if at_low >= 0.0:
+            return low, at_low > margin
+        if at_high <= 0.0:
+            return high, at_high < -margin
+        return optimize.brentq(error, low, high, xtol=1e-14, rtol=1e-14), False
+
+    def _outcome(self, drive, force, load, inputs) -> Outcome:
+        """Say what a drive would do; commits nothing."""
+        heat = self._steady.step(drive, inputs)
+        output, muscles = self._muscles.respond(self._first.peek(heat), load)
+        offset, factor = 0.0, 1.0
+        if self._steady.drifts:
+            before = self._steady.save()
+            offset, factor = self._steady.advance(drive, heat, self._worn(inputs, drive))
+            self._steady.restore(before)
+        base, load = self._muscles.base, np.float64(force)
+        length = (base + float(self._chain.scale(load)) * factor * (output - base)
+                  + float(self._chain.stretch(load)) + offset)
+        return Outcome(length, heat, muscles)
+
+    def _commit(self, drive, outcome, inputs, time):
+        self._first.step(outcome.heat)
+        self._muscles.step(outcome.muscles)
+        self._steady.advance(drive, outcome.heat, self._worn(inputs, drive))
+        self._fresh = False
+        self._start, self._target = self._felt, outcome.heat
+        self._phase_before, self._phase = self._present_phase(), inputs.phase
+        if time is not None and math.isfinite(self.horizon):
+            self._deadline = time + self.horizon
+            drive = self._towards(outcome.heat, inputs.phase, self.horizon)
+        self._apply(drive)
+        return drive
 
     def hold(self, time: float) -> float:
         """
-        Return the drive that keeps the last reference, without touching the memory.
+        Return the drive that keeps the last reference, without touching its memory.
 
-        It differs from the last setpoint's only while a lagging muscle is being overdriven.
+        It differs from the last setpoint's only while a lagging muscle is being overdriven, which
+        ends with the first call at the horizon or after it.
+
+        Parameters
+        ----------
+        time : float
+            Now [s].
         """
         self._advance(time)
-        if math.isfinite(self.horizon) and not self._fresh:
-            inputs = self._inputs(self.horizon, math.nan, math.nan)
-            self._voltage, _ = self._clip(self._chain.inverse(self._target_heat, inputs))
+        if math.isfinite(self.horizon) and not self._fresh and self._time is not None:
+            # Shorter than the time to the next call it would be overdriven for too long.
+            remaining = max(self._deadline - self._time, self._period)
+            self._apply(self._towards(self._target, self._phase, remaining))
         return self._voltage
 
-    def _advance(self, time) -> None:
-        if time is None:
+    def _towards(self, heat, phase, duration):
+        """Drive that brings the muscle to a heat within a time [s], as far as the limits let."""
+        return self._clip(self._chain.inverse(heat, self._inputs(duration, phase, math.nan)))[0]
+
+    def _apply(self, drive):
+        self._travel += abs(drive - self._voltage)
+        self._voltage = drive
+
+    def _advance(self, time):
+        """Let the lagging muscle feel what was applied until now."""
+        if time is None or not math.isfinite(time):
             return
-        if self._time is not None and time > self._time:
-            self._chain.step(self._voltage, self._inputs(time - self._time, math.nan, math.nan))
-        elif self._time is None:
-            self._chain.step(self._voltage, self._inputs(0.0, math.nan, math.nan))
-        self._time = time
+        if self._time is None:
+            self._felt = self._chain.step(self._voltage, self._inputs(0.0, self._phase, math.nan))
+            self._time = time
+        elapsed = time - self._time
+        if elapsed <= 0.0:
+            return
+        pieces = min(math.ceil(elapsed / PHASE_STEP), 1000) if self._chain.needs_phase else 1
+        for _ in range(pieces):
+            self._felt = self._chain.step(self._voltage, self._inputs(
+                elapsed / pieces, self._present_phase(), math.nan))
+        self._time, self._period = time, elapsed
+
+    def _present_phase(self):
+        """Martensite share on the way from the last reference but one to the last."""
+        if self._felt is None or self._start is None or self._target == self._start:
+            return self._phase
+        share = (self._felt - self._start) / (self._target - self._start)
+        share = min(max(share, 0.0), 1.0)
+        return self._phase_before + share * (self._phase - self._phase_before)
 
     def _inputs(self, step, phase, ambient) -> Inputs:
-        low, high = self.model.ranges.get(self.model.drive, (0.0, 1.0))
-        cycles = self._travel / (2.0 * max(high - low, 1e-12))
-        return Inputs(0.0, 0.0, step, ambient, phase, cycles)
+        if math.isfinite(ambient):
+            self._ambient = ambient
+        known = math.nan if self._ambient is None else self._ambient
+        return Inputs(0.0, 0.0, step, known, phase, 0.0)
 
-    def _drift(self, heat) -> tuple[float, float]:
-        inputs = self._inputs(np.zeros(1), math.nan, math.nan)
-        inputs = inputs._replace(time=np.zeros(1), cycles=np.array([inputs.cycles]))
-        offset, factor = self._chain.drift(np.array([self._voltage]), np.array([heat]), inputs)
-        return float(offset[0]), float(factor[0])
+    def _worn(self, inputs, drive):
+        """Return the inputs with the cycles that there will be after `drive`."""
+        travel = self._travel + abs(drive - self._voltage)
+        return inputs._replace(cycles=travel / (2.0 * self.model.drive_range))
+
+    def _no_number(self):
+        return Setpoint(self._clip(self._voltage)[0], True, math.nan, math.nan,
+                        'the reference is not a finite number')
 
     def _clip(self, drive: float) -> tuple[float, bool]:
         low, high = self.limits
         if not math.isfinite(drive):
-            return self._voltage, True
-        margin = 1e-9 * max(abs(low), abs(high), 1e-12) if math.isfinite(high) else 0.0
+            return min(max(self._voltage, low), high), True
+        margin = 1e-9 * max(abs(low), abs(high)) if math.isfinite(high) else 0.0
         clipped = min(max(drive, low), high)
         return clipped, abs(clipped - drive) > margin

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hysteresis_ros.bicep.balance import ArmBalance
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.effects import Effect, Surroundings
 from hysteresis_ros.errors import ModelFileError, ParameterError
@@ -91,7 +92,7 @@ class MuscleModel:
         largest = max(abs(value) for value in self.ranges.get(self.drive, (0.0, 1.0)))
         heat = float(Chain([], Surroundings(1.0, 1.0, 1.0, 1.0, self.drive)).to_heat(largest))
         return Surroundings(length, self.mean_load, heat, span, self.drive, self.load_name,
-                            self.response)
+                            self.response, self.cold_drive, self.drive_range, self.sign)
 
     def with_effects(self, effects: Sequence[Effect]) -> 'MuscleModel':
         """Return a copy with other effects and the same operators."""
@@ -111,6 +112,18 @@ class MuscleModel:
         if self.drive in COLD_DRIVE:
             return COLD_DRIVE[self.drive]
         return self.ranges.get(self.drive, (0.0, 0.0))[0]
+
+    @property
+    def drive_range(self) -> float:
+        """Width of the drive's range, on which steps and cycles are counted."""
+        low, high = self.ranges.get(self.drive, (0.0, 1.0))
+        return max(high - low, 1e-12)
+
+    def martensite(self, length):
+        """Return the share of the cold phase at an elongation, 0 to 1; arrays of any shape."""
+        low, high = self.require_length_range()
+        share = np.clip((length - low) / max(high - low, 1e-12), 0.0, 1.0)
+        return share if self.sign < 0 else 1.0 - share
 
     def predict(self, measurement, method: str = 'preisach') -> np.ndarray:
         """
@@ -150,21 +163,48 @@ class MuscleModel:
         from hysteresis_ros.model.observer import Observer
         return Observer(self)
 
+    def balance(self, chain: Chain) -> ArmBalance:
+        """
+        Return the balance between the muscle, its memory wiped, and the arm.
+
+        Raises
+        ------
+        ParameterError
+            If the model has no arm, or a muscle that cannot lift it.
+        ModelFileError
+            If the model has no length stage.
+        """
+        geometry, stage = self.require_geometry(), self.require_length_stage()
+        loaded = self.first_stage(chain).loaded
+        if self.sign > 0:
+            raise ParameterError('the model is of a muscle that extends when driven; the bicep '
+                                 'needs one that contracts')
+        if self.response != 'length' or (loaded and self.load_name != 'force'):
+            raise ParameterError(
+                f'the model gives {self.response} under {self.load_name}; the bicep needs a '
+                'length table with forces')
+        return ArmBalance(stage, geometry, chain, loaded)
+
     def require_geometry(self) -> BicepGeometry:
-        """Return the arm's geometry, or say that the model has none."""
+        """Return the arm's geometry; ParameterError if the model has none."""
         if self.geometry is None:
             raise ParameterError(
                 'the model has no arm geometry; identify it with --geometry geometry.yaml')
         return self.geometry
 
     def require_length_stage(self) -> HysteresisOperator:
-        """Return a copy of H2 with its memory wiped, or say that the model has none."""
-        if self.length_stage is None:
-            raise ModelFileError(
-                'the model has no length stage; identify it with a length table')
+        """Return a copy of H2 with its memory wiped; ModelFileError if the model has none."""
+        self.require_length_range()
         operator = copy.deepcopy(self.length_stage)
         operator.reset()
         return operator
+
+    def require_length_range(self) -> tuple[float, float]:
+        """Return what H2 can give; ModelFileError if the model has none."""
+        if self.length_stage is None:
+            raise ModelFileError(
+                'the model has no length stage; identify it with a length table')
+        return self.length_stage.output_range
 
 
 class FirstStage:
@@ -213,14 +253,14 @@ class FirstStage:
         drive = float(self._chain.to_drive(heat))
         return self._operator.step(drive) if self._operator is not None else drive
 
-    def invert(self, x: float, dead_band: float = 0.0) -> tuple[float, float, bool]:
-        """Return the heat for x, what x it really gives, and whether it is saturated."""
+    def invert(self, x: float) -> tuple[float, bool]:
+        """Return the heat for x, and whether x is out of reach."""
         if self.load_per_heat > 0.0:
-            return x / self.load_per_heat, x, False
+            return x / self.load_per_heat, False
         if self._operator is None:
-            return float(self._chain.to_heat(x)), x, False
-        found = self._operator.invert(x, dead_band=dead_band)
-        return float(self._chain.to_heat(found.input)), found.output, found.saturated
+            return float(self._chain.to_heat(x)), False
+        found = self._operator.invert(x)
+        return float(self._chain.to_heat(found.input)), found.saturated
 
     def peek(self, heat: float) -> float:
         """Return x without committing."""

@@ -4,9 +4,6 @@
 
 import math
 
-import numpy as np
-
-from hysteresis_ros.bicep.balance import ArmBalance
 from hysteresis_ros.effects import Inputs
 
 
@@ -14,33 +11,46 @@ class Observer:
     """
     Predict the measured angle from the applied drive.
 
-    Effects that need more of the past than a state (creep since the last step) are left out.
+    It gives what `Simulator` gives for the same samples, but for effects that depend on the phase:
+    those take the phase of the sample before.
 
     Parameters
     ----------
     model : MuscleModel
         With a geometry.
+
+    Raises
+    ------
+    ParameterError
+        If the model has no arm, or a muscle that cannot lift it.
+    ModelFileError
+        If it has no length stage.
     """
 
     def __init__(self, model):
         self.model = model
         self._chain = model.chain()
-        offsets = next((e.offsets for e in model.effects if hasattr(e, 'offsets')), (0.0,))
         self._first = model.first_stage(self._chain)
-        self._balance = ArmBalance(model.require_length_stage(), model.require_geometry(),
-                                   self._chain, offsets)
+        self._balance = model.balance(self._chain)
+        self._travel = 0.0
         self.reset()
 
-    def reset(self) -> None:
-        """Forget the history: the muscle was heated and cooled."""
+    def reset(self, time: float | None = None) -> None:
+        """
+        Forget the history: the muscle was heated and cooled. What has worn it stays.
+
+        Parameters
+        ----------
+        time : float, optional
+            When it begins [s]; by default with the first sample.
+        """
         cold = self.model.cold_drive
         self._chain.start()
         self._first.reset()
         self._balance.start()
         self._balance.settle(self._first.step(float(self._chain.to_heat(cold))))
-        self._time = None
+        self._time = time
         self._drive = cold
-        self._travel = 0.0
         self._phase = 1.0
 
     def step(self, time: float, drive: float, ambient: float = math.nan) -> float:
@@ -50,7 +60,7 @@ class Observer:
         Parameters
         ----------
         time : float
-            Time [s]; it has to grow.
+            Time [s]. One that does not grow counts as no time.
         drive : float
             Drive since the sample before. A value that is not finite counts as the one before.
         ambient : float
@@ -63,21 +73,19 @@ class Observer:
         """
         if not math.isfinite(drive):
             drive = self._drive
-        dt = 0.0 if self._time is None else max(time - self._time, 0.0)
+        before = time if self._time is None else self._time
+        if not time >= before:
+            time = before
+        dt = time - before
         self._travel += abs(drive - self._drive)
-        low, high = self.model.ranges.get(self.model.drive, (0.0, 1.0))
-        cycles = self._travel / (2.0 * max(high - low, 1e-12))
-        inputs = Inputs(time, time, dt, ambient, self._phase, cycles)
-        heat = self._chain.step(drive, inputs)
-        one = np.array
-        offset, factor = self._chain.drift(one([drive]), one([heat]), inputs._replace(
-            time=one([time]), cycles=one([cycles])))
-        angle = self._balance.step(self._first.step(heat), dt, float(offset[0]), float(factor[0]))
-        if self._chain.needs_phase:
-            low, high = self.model.length_stage.output_range
-            length = float(self.model.geometry.length(angle))
-            self._phase = min(max((length - low) / (high - low), 0.0), 1.0)
         self._time, self._drive = time, drive
+        inputs = Inputs(time, time, dt, ambient, self._phase,
+                        self._travel / (2.0 * self.model.drive_range))
+        heat = self._chain.step(drive, inputs)
+        offset, factor = self._chain.advance(drive, heat, inputs)
+        angle = self._balance.step(self._first.step(heat), dt, offset, factor)
+        if self._chain.needs_phase:
+            self._phase = float(self.model.martensite(self.model.geometry.length(angle)))
         for effect in self._chain.sensor:
             angle = effect.step(angle, dt)
         return angle

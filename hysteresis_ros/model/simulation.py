@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulation of a whole measurement from its inputs alone, trial by trial."""
 
+import copy
 import dataclasses
 
 import numpy as np
 
-from hysteresis_ros.bicep.balance import ArmBalance
 from hysteresis_ros.effects import Inputs
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
@@ -41,6 +41,12 @@ def trials_of(model, measurement) -> list[Trial]:
     Returns
     -------
     list of Trial
+        In the order of the table; `Inputs.clock` and `Inputs.cycles` run on from one to the next.
+
+    Raises
+    ------
+    MeasurementError
+        If the table lacks the model's drive.
     """
     drive = measurement.column(model.drive)
     load = (measurement.columns.get(model.load_name) if model.load_name else None)
@@ -57,6 +63,9 @@ def trials_of(model, measurement) -> list[Trial]:
         else:
             time = measurement.time[rows]
         step = np.diff(time, prepend=0.0)
+        if measurement.settled:
+            # The first row is a settled state, too, even where its time is 0.
+            step[0] = max(step[0], HOLD)
         travelled = travel + np.cumsum(np.abs(np.diff(values, prepend=model.cold_drive)))
         inputs = Inputs(
             time=time, clock=clock + time, step=step,
@@ -103,12 +112,16 @@ class Simulator:
         Returns
         -------
         ndarray, shape (rows,)
-            The response as the sensor would give it.
+            The response as the sensor would give it: force [N], length [m], strain, angle [rad].
+
+        Raises
+        ------
+        ParameterError, ModelFileError
+            If the model lacks what this kind of measurement needs.
         """
-        model = self.model
-        chain = Chain(effects, model.surroundings)
+        chain = Chain(effects, self.model.surroundings)
         result = np.empty(self.measurement.rows)
-        respond = self._responder(chain, effects, inputs_of_stage)
+        respond = self._responder(chain, inputs_of_stage)
         for trial in self.trials:
             inputs = trial.inputs
             if chain.needs_phase:
@@ -121,49 +134,48 @@ class Simulator:
         return result
 
     def _phase(self, response):
-        """Martensite share as the response shows it: long is martensite."""
-        length = response
+        """Martensite share as the response shows it."""
+        if self.measurement.response == 'force':
+            low, high = self.model.force_stage.output_range
+            return np.clip((high - response) / max(high - low, 1e-12), 0.0, 1.0)
         if self.measurement.response == 'angle':
-            length = self.model.geometry.length(response)
-        low, high = self.model.length_stage.output_range
-        return np.clip((length - low) / max(high - low, 1e-12), 0.0, 1.0)
+            response = self.model.geometry.length(response)
+        return self.model.martensite(response)
 
-    def _responder(self, chain, effects, inputs_of_stage):
+    def _responder(self, chain, inputs_of_stage):
         response = self.measurement.response
         if response == 'force':
-            return lambda trial, inputs: self._force(chain, trial, inputs)
-        stage = self.model.require_length_stage()
-        if response == 'angle':
-            if self.model.sign > 0:
-                raise ParameterError('the model is of a muscle that extends when driven; the '
-                                     'bicep needs one that contracts')
-            offsets = next((e.offsets for e in effects if hasattr(e, 'offsets')), (0.0,))
-            balance = ArmBalance(stage, self.model.require_geometry(), chain, offsets)
-            return lambda trial, inputs: self._angle(
-                chain, balance, trial, inputs, inputs_of_stage)
-        return lambda trial, inputs: self._length(chain, stage, trial, inputs)
-
-    def _first(self, chain, trial, inputs):
-        """Cold x, x of each row, and heat of each row."""
+            if self.model.force_stage is None:
+                raise ParameterError(
+                    'the model has no force stage; identify it with --force F.csv')
+            operator = copy.deepcopy(self.model.force_stage)
+            return lambda trial, inputs: self._force(chain, operator, trial, inputs)
         first = self.model.first_stage(chain)
+        if response == 'angle':
+            balance = self.model.balance(chain)
+            return lambda trial, inputs: self._angle(
+                chain, first, balance, trial, inputs, inputs_of_stage)
+        stage = self.model.require_length_stage()
+        return lambda trial, inputs: self._length(chain, first, stage, trial, inputs)
+
+    def _first(self, chain, first, trial, inputs):
+        """Cold x, x of each row, and heat of each row."""
         heat = chain.heat(trial.drive, inputs)
         cold = chain.to_heat(self.model.cold_drive)
+        first.reset()
         x = first.simulate(np.concatenate(([cold], heat)))
-        return x[0], x[1:], heat, first.loaded
+        return float(x[0]), x[1:], heat
 
-    def _force(self, chain, trial, inputs):
-        if self.model.force_stage is None:
-            raise ParameterError('the model has no force stage; identify it with --force F.csv')
+    def _force(self, chain, operator, trial, inputs):
         drive = chain.to_drive(chain.heat(trial.drive, inputs))
-        operator = self.model.force_stage
         operator.reset()
         operator.step(self.model.cold_drive)
         return operator.simulate(drive)
 
-    def _length(self, chain, stage, trial, inputs):
+    def _length(self, chain, first, stage, trial, inputs):
         model = self.model
-        cold, x, heat, loaded = self._first(chain, trial, inputs)
-        load = chain.load_inside(trial.load) if loaded else 0.0 * trial.load
+        cold, x, heat = self._first(chain, first, trial, inputs)
+        load = chain.load_inside(trial.load) if first.loaded else 0.0 * trial.load
         stage.reset()
         stage.step(model.sign * (cold - load[0]))
         output = stage.simulate(model.sign * (x - load))
@@ -172,14 +184,13 @@ class Simulator:
         return (base + chain.scale(trial.load) * factor * (output - base)
                 + chain.stretch(trial.load) + offset)
 
-    def _angle(self, chain, balance, trial, inputs, inputs_of_stage):
-        cold, x, heat, _ = self._first(chain, trial, inputs)
+    def _angle(self, chain, first, balance, trial, inputs, inputs_of_stage):
+        cold, x, heat = self._first(chain, first, trial, inputs)
         offset, factor = chain.drift(trial.drive, heat, inputs)
         chosen = self._chosen_rows(x)
-        times = inputs.time[chosen]
-        steps = np.diff(times, prepend=0.0).tolist()
+        steps = np.diff(np.cumsum(inputs.step)[chosen], prepend=0.0).tolist()
         balance.start()
-        balance.settle(float(cold))
+        balance.settle(cold)
         angles, stage_inputs = [], []
         for row in zip(x[chosen].tolist(), steps, offset[chosen].tolist(),
                        factor[chosen].tolist()):
@@ -189,7 +200,7 @@ class Simulator:
             inputs_of_stage.append((np.array(stage_inputs), chosen, len(x)))
         if len(chosen) == len(x):
             return np.array(angles)
-        return np.interp(inputs.time, times, angles)
+        return np.interp(inputs.time, inputs.time[chosen], angles)
 
     def _chosen_rows(self, x):
         rows = np.arange(len(x))

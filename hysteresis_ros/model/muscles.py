@@ -1,0 +1,90 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The second stage as a controller needs it: one muscle, or parallel ones of unequal length."""
+
+from collections.abc import Sequence
+
+from hysteresis_ros.bicep.bundle import Bundle
+
+# Elongation [m] by which elastic wires may leave the range of the transformation.
+ELASTIC_ROOM = 0.02
+
+
+class Muscles:
+    """
+    H2 with its memory: ``output = H2[sign (x - load)]``, and the inverse for x (Eq. 13).
+
+    Parameters
+    ----------
+    operator : HysteresisOperator
+        The second stage H2; it is copied.
+    sign : int
+        -1 for muscles that contract when driven, 1 for one that extends.
+    offsets : tuple of float
+        Excess length [m] of each parallel muscle; one entry for equal muscles.
+    """
+
+    def __init__(self, operator, sign: int, offsets: tuple):
+        self._bundle = Bundle(operator, offsets)
+        self._operators = self._bundle.operators
+        self._sign = sign
+        self.base, self._top = operator.output_range
+        self._room = max(abs(excess) for excess in offsets) + ELASTIC_ROOM
+
+    @property
+    def _equal(self) -> bool:
+        return len(self._operators) == 1
+
+    def reset(self) -> None:
+        """Wipe the memory."""
+        self._bundle.reset()
+
+    def save(self) -> list:
+        """Return the memory as plain types."""
+        return [operator.save() for operator in self._operators]
+
+    def restore(self, state: Sequence) -> None:
+        """
+        Take back what `save` returned.
+
+        Raises
+        ------
+        ParameterError, ValueError
+            If it was saved by other muscles.
+        """
+        for operator, entry in zip(self._operators, state, strict=True):
+            operator.restore(entry)
+
+    def settle_cold(self, x: float, load: float, inputs: Sequence | None = None) -> None:
+        """
+        Start from the cold state.
+
+        Parameters
+        ----------
+        x, load : float
+            Output of the first stage, and load that is borne, both cold.
+        inputs : sequence of float, optional
+            What each muscle starts from, where that is known better.
+        """
+        self.reset()
+        self.step(self.respond(x, load)[1] if inputs is None else inputs)
+
+    def drive(self, output: float, load: float, dead_band: float = 0.0) -> tuple[float, bool]:
+        """Return x for an output [m] under a load, and whether that output is out of reach."""
+        if not self._equal:
+            return self._bundle.drive(self._bundle.inputs(output), load), False
+        found = self._operators[0].invert(output, dead_band=dead_band)
+        return self._sign * found.input + load, found.saturated
+
+    def respond(self, x: float, load: float) -> tuple[float, list[float]]:
+        """Return the output [m] and the inputs that `step` would commit."""
+        if self._equal:
+            u = self._sign * (x - load)
+            return self._operators[0].peek(u), [u]
+        output = self._bundle.settle(
+            lambda _: load, x, self.base - self._room, self._top + self._room, self.base)
+        return output, self._bundle.inputs(output)
+
+    def step(self, inputs: Sequence) -> None:
+        """Commit each muscle's input."""
+        self._bundle.step(inputs)
