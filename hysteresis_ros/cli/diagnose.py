@@ -1,0 +1,74 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`hysteresis diagnose`: which physical effect the model is missing."""
+
+from hysteresis_ros.cli.common import (
+    add_data, add_json, add_model, progress, read_all, say, write_json)
+
+UNITS = {'angle': (57.29577951308232, 'deg'), 'length': (1e3, 'mm'), 'strain': (100.0, '%'),
+         'force': (1.0, 'N')}
+
+
+def add_parser(subparsers):
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        'diagnose', help='which physical effect is missing',
+        description='Tries every effect of the catalogue that the data can show, on rows that '
+        'were not fitted, and names one only if it explains more than chance and more than the '
+        "base model's own error could.")
+    add_model(parser)
+    add_data(parser)
+    parser.add_argument('--settled', action='store_true',
+                        help='of a continuous run take only the ends of its holds')
+    parser.add_argument('--jobs', type=int, default=-1, metavar='N',
+                        help='processes (default: one for each core)')
+    parser.add_argument('--seed', type=int, default=0, metavar='S',
+                        help='of the random draws behind the p values (default: 0)')
+    add_json(parser)
+    parser.add_argument('--report', metavar='R.html', help='write one page with all pictures')
+    return parser
+
+
+def run(args):
+    """Do it."""
+    from hysteresis_ros.diagnosis.diagnose import diagnose
+    from hysteresis_ros.model import MuscleModel
+
+    model = MuscleModel.load(args.model)
+    measurements = read_all(args.data, args.namespace, args.settled)
+    found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed,
+                     progress=lambda items, total: progress(items, 'effects', total))
+    say(args, to_text(found, measurements[-1].response))
+    if args.json:
+        write_json(args.json, found.to_json())
+    if args.report:
+        from hysteresis_ros.diagnosis.report import write_diagnosis
+        write_diagnosis(args.report, model, measurements, found, args.model)
+
+
+def to_text(found, response):
+    """Return the diagnosis for a terminal."""
+    from hysteresis_ros.diagnosis.compare import layout
+    from hysteresis_ros.diagnosis.words import verdict_in_words
+
+    factor, unit = UNITS[response]
+    lines = [verdict_in_words(found), '']
+    lines.append(f'error on rows not fitted: {factor * found.rmse_before:.3g} {unit}'
+                 + (f', with the effects {factor * found.rmse_after:.3g} {unit}'
+                    if found.missing else ''))
+    lines.append(f'noise floor {factor * found.noise_floor:.2g} {unit}, error of the base model '
+                 f'about {factor * found.structural_error:.2g} {unit}, unexplained '
+                 f'{100.0 * found.unexplained:.0f} %')
+    rows = [['effect', f'RMSE after [{unit}]', 'gain', 'p', 'absorbed', 'parameters']]
+    for row in found.ranking[:10]:
+        values = ', '.join(f'{name} {entry["value"]:.3g} {entry["unit"]}'
+                           for name, entry in row['parameters'].items())
+        rows.append([row['effect'], f'{factor * row["rmse_after"]:.3g}',
+                     f'{100.0 * row["gain"]:.0f} %', f'{row["p_value"]:.3f}',
+                     f'{100.0 * row["absorbed"]:.0f} %',
+                     values + ('' if row['plausible'] else ' (outside its physical range)')])
+    lines += ['', *layout(rows)]
+    if found.not_excited:
+        lines += ['', 'could not have shown: ' + ', '.join(found.not_excited)]
+    lines += ['', 'next: ' + found.experiment]
+    return '\n'.join(lines)

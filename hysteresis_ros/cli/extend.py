@@ -1,0 +1,70 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`hysteresis extend`: add effects to a model and see the error fall."""
+
+from hysteresis_ros.cli.common import add_json, add_model, must_differ, read_all, say, write_json
+from hysteresis_ros.cli.diagnose import UNITS
+
+
+def add_parser(subparsers):
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        'extend', help='add effects, fit them, and show the error before and after',
+        description='Fits the effects to the recordings of --data, writes the extended model, and '
+        'shows the error before and after, also on the recordings of --test, which are not '
+        'fitted.')
+    add_model(parser)
+    parser.add_argument('--add', required=True, metavar='EFFECT[,EFFECT]',
+                        help='effects to add, in order')
+    parser.add_argument('--data', nargs='+', required=True, metavar='TRAIN',
+                        help='recordings to fit: CSV files or rosbag2 folders')
+    parser.add_argument('--test', nargs='+', default=[], metavar='TEST',
+                        help='recordings that are not fitted')
+    parser.add_argument('--namespace', metavar='NS',
+                        help='which arm to take from a bag that recorded several')
+    parser.add_argument('--settled', action='store_true',
+                        help='of a continuous run take only the ends of its holds')
+    parser.add_argument('-o', '--output', required=True, metavar='MODEL.yaml')
+    add_json(parser)
+    parser.add_argument('--report', metavar='R.html', help='write one page with all pictures')
+    return parser
+
+
+def run(args):
+    """Do it."""
+    from hysteresis_ros.diagnosis.extend import extend
+    from hysteresis_ros.model import MuscleModel
+
+    must_differ(args.output, *args.data, *args.test)
+    model = MuscleModel.load(args.model)
+    train = read_all(args.data, args.namespace, args.settled)
+    test = read_all(args.test, args.namespace, args.settled)
+    names = [name.strip() for name in args.add.split(',') if name.strip()]
+    extension = extend(model, names, train, test)
+    extension.model.save(args.output)
+    say(args, to_text(extension, train[0].response))
+    say(args, f'\nWritten to {args.output}')
+    if args.json:
+        write_json(args.json, extension.to_json())
+    if args.report:
+        from hysteresis_ros.diagnosis.report import write_extension
+        write_extension(args.report, model, extension, train, test, args.output)
+
+
+def to_text(extension, response):
+    """Return the gain for a terminal."""
+    factor, unit = UNITS[response]
+    lines = []
+    for effect in extension.added:
+        values = ', '.join(f'{name} {entry["value"]:.4g} {entry["unit"]} '
+                           f'({entry["low"]:.4g} to {entry["high"]:.4g})'
+                           for name, entry in effect.to_dict()['parameters'].items())
+        lines.append(f'+ {effect.id}: {values}')
+    for name in extension.implausible:
+        lines.append(f'! {name} is outside its physical range: it stands in for something else')
+    for label, errors in (('fitted', extension.train), ('not fitted', extension.test)):
+        if errors:
+            lines.append(f'RMSE on data {label}: {factor * errors["rmse_before"]:.3g} {unit} -> '
+                         f'{factor * errors["rmse_after"]:.3g} {unit}')
+    lines += [f'  {name:32s} {factor * value:.3g} {unit}' for name, value in extension.steps]
+    return '\n'.join(lines)

@@ -1,0 +1,160 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Add effects to a model, fit them, and show the error before and after on data not fitted."""
+
+import dataclasses
+import hashlib
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.fit import Fitter
+from hysteresis_ros.diagnosis.parameters import starts_of
+from hysteresis_ros.diagnosis.problem import problem_for
+from hysteresis_ros.effects import effect_class
+from hysteresis_ros.errors import ParameterError
+
+EVALUATIONS = 30
+
+
+@dataclasses.dataclass
+class Extension:
+    """
+    An extended model with what it gained.
+
+    Attributes
+    ----------
+    model : MuscleModel
+        With the effects.
+    added : list of Effect
+        The new ones, fitted, with 95 % intervals.
+    train, test : dict
+        ``rmse_before`` and ``rmse_after`` on fitted and on other recordings, in the unit of the
+        response; `test` is empty without one.
+    steps : list of (str, float)
+        Error on `test`, or on `train` without one, of the base and after each effect.
+    implausible : list of str
+        Parameters outside their physical range.
+    """
+
+    model: object
+    added: list
+    train: dict
+    test: dict
+    steps: list
+    implausible: list
+
+    def to_json(self) -> dict:
+        """Return plain types for JSON."""
+        return {
+            'added': [effect.id for effect in self.added],
+            'parameters': {effect.id: effect.to_dict()['parameters'] for effect in self.added},
+            'train': self.train, 'test': self.test,
+            'steps': [{'model': name, 'rmse': value} for name, value in self.steps],
+            'implausible': self.implausible}
+
+
+def rmse(model, measurements) -> float:
+    """Root mean square error of a model over recordings, in the unit of the response."""
+    squares, rows = 0.0, 0
+    for measurement in measurements:
+        error = model.predict(measurement) - measurement.column(measurement.response)
+        squares += float(np.sum(error ** 2))
+        rows += len(error)
+    return float(np.sqrt(squares / rows))
+
+
+def extend(model, names, train, test=()) -> Extension:
+    """
+    Add effects and fit them together.
+
+    On arm runs the weights of the bench stay as they are; on bench tables they are fitted again.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    names : sequence of str
+        Effects of the catalogue, in the order in which they are added.
+    train : sequence of Measurement
+        Recordings to fit.
+    test : sequence of Measurement
+        Recordings of the same kind that are only predicted.
+
+    Returns
+    -------
+    Extension
+
+    Raises
+    ------
+    ParameterError
+        If an effect is unknown, named twice, already there, or cannot show in this kind of data.
+    MeasurementError
+        If the recordings do not fit together.
+    """
+    classes = _checked(model, names)
+    problem = problem_for(model, train)
+    fitter = Fitter(problem)
+    for kind in classes:
+        if problem.kind not in kind.kinds:
+            raise ParameterError(f'effect {kind.id} cannot be fitted to a {problem.kind} '
+                                 'measurement; give an arm run')
+    replaced = {name for kind in classes for name in kind.replaces}
+    base = model.with_effects([e for e in model.effects if e.id not in replaced])
+    judged = list(test) or list(train)
+    models, known = [('base', model)], []
+    for kind in classes:
+        known = [effect for effect in known if effect.id not in kind.replaces]
+        fit = _best(fitter, base.effects, known, kind(model.surroundings))
+        known = fit.effects
+        models.append((f'+ {kind.id}', problem.completed([*base.effects, *known])))
+    fit = fitter.fit(base.effects, known, evaluations=EVALUATIONS)
+    added = fitter.with_intervals(fit)
+    extended = _stamped(problem.completed([*base.effects, *added]), added, train)
+    models[-1] = (models[-1][0], extended)
+    steps = [(name, rmse(one, judged)) for name, one in models]
+    # Where weights are refitted, the fair base is one that was refitted to the same rows.
+    before = problem.completed(model.effects) if problem.refits else model
+
+    def both(recordings):
+        if not recordings:
+            return {}
+        return {'rmse_before': rmse(before, recordings), 'rmse_after': rmse(extended, recordings)}
+    return Extension(extended, added, both(list(train)), both(list(test)), steps,
+                     fit.implausible())
+
+
+def _checked(model, names):
+    names = list(names)
+    present = {effect.id for effect in model.effects}
+    for name in names:
+        if names.count(name) > 1:
+            raise ParameterError(f'effect {name} is named twice')
+        if name in present:
+            raise ParameterError(f'the model already has the effect {name}')
+    if not names:
+        raise ParameterError('no effect is named; `hysteresis effects` lists them')
+    return [effect_class(name) for name in names]
+
+
+def _best(fitter, fixed, known, effect):
+    """Fit from the starts of the new effect and, on the bench, from usual values of all."""
+    fits = [fitter.search(fixed, known, effect)]
+    if fitter.problem.refits and known:
+        usual = []
+        for one in [*known, effect]:
+            starts = starts_of(one, fitter.problem.kind)
+            usual.append(starts[len(starts) // 2])
+        fits.append(fitter.fit(fixed, usual))
+    return min(fits, key=lambda fit: fitter.error(fit.predicted))
+
+
+def _stamped(model, added, train):
+    """Note in the provenance what was added from which recordings."""
+    provenance = dict(model.provenance)
+    history = list(provenance.get('extended', []))
+    history.append({
+        'effects': [effect.id for effect in added],
+        'data': [{'source': str(m.source).rsplit('/', 1)[-1],
+                  'sha256': m.digest or hashlib.sha256(
+                      m.column(m.response).tobytes()).hexdigest()} for m in train]})
+    provenance['extended'] = history
+    return dataclasses.replace(model, provenance=provenance)

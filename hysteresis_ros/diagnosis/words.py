@@ -1,0 +1,46 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The verdict as sentences that a person can act on."""
+
+from hysteresis_ros.effects import catalogue
+
+
+def verdict_in_words(found) -> str:
+    """
+    Return the verdict of a diagnosis in plain words.
+
+    Parameters
+    ----------
+    found : Diagnosis
+
+    Returns
+    -------
+    str
+        One paragraph.
+    """
+    effects = catalogue()
+    if found.verdict == 'missing':
+        parts = []
+        for name, others in zip(found.missing, found.alternatives):
+            text = f'{name}. {effects[name].sentence}'
+            if others:
+                text += f' This data cannot tell it from {" or ".join(others)}.'
+            parts.append(text)
+        share = 100.0 * (1.0 - found.rmse_after / found.rmse_before)
+        return ('Missing: ' + ' Also missing: '.join(parts)
+                + f' Adding {"them" if len(parts) > 1 else "it"} takes {share:.0f} % off the error.')
+    if found.verdict == 'unknown':
+        text = ('Unknown: something acts here that no effect of the catalogue explains '
+                f'({100.0 * found.unexplained:.0f} % of the mean square error).')
+        if found.event is not None:
+            text += f' It happened at {found.event:.0f} s and lasts.'
+        elif found.signal:
+            text += f' It shows in {found.signal}.'
+        if found.missing:
+            text += f' The effects that explain most of it are {", ".join(found.missing)}.'
+        return text
+    if found.verdict == 'not_excited':
+        return ('Not excited: this recording moves too little to show whether an effect is '
+                'missing.')
+    return ("Adequate: no effect of the catalogue explains more than chance and the base model's "
+            'own error.')
