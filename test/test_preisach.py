@@ -500,6 +500,18 @@ def test_merging_keeps_the_weight_below_the_staircase():
     assert merged[-2:] == corners[-2:] and levels[-1] == sums[-1]
 
 
+def test_everett_function_and_its_solutions_end_with_the_plane():
+    everett = Everett(np.array([0.0, 1.0, 2.0]), np.array([1.0, 1.0, 1.0]))
+    assert everett.at(1.5, 0.25) == pytest.approx(0.5 * 1.25 ** 2)
+    assert everett.alpha(0.5 * 1.25 ** 2, 0.25, 0.0)[0] == pytest.approx(1.5)
+    assert everett.beta(0.5 * 1.25 ** 2, 1.5, 0.0)[0] == pytest.approx(0.25)
+    for corner, end in ((1.5, 0.5 ** 2 / 2.0), (0.5, 1.5 ** 2 / 2.0)):
+        assert everett.alpha(9.0, corner, 0.0) == pytest.approx((2.0, end))
+        assert everett.alpha(1e-15, corner, 1e-14) == (corner, 0.0)
+        assert everett.beta(9.0, 2.0 - corner, 0.0) == pytest.approx((0.0, end))
+        assert everett.beta(1e-15, corner, 1e-14) == (corner, 0.0)
+
+
 # Files
 
 def test_parameters_survive_a_file_to_the_last_bit():

@@ -9,7 +9,8 @@ from unittest import mock
 from hypothesis import given, settings, strategies as st
 import numpy as np
 
-from hysteresis_ros.operators import Preisach, cells, preisach
+from hysteresis_ros.operators import (
+    Preisach, cells, operator_from_dict, preisach, signed_lengths)
 
 slow = settings(deadline=None, max_examples=80, derandomize=True)
 shares = st.floats(0.0, 1.0)
@@ -17,7 +18,7 @@ shares = st.floats(0.0, 1.0)
 
 @st.composite
 def operators(draw):
-    """Return an operator with an uneven grid, plateaus and either sign."""
+    """Return an operator with an uneven grid, plateaus, either sign, and often a line."""
     levels = draw(st.integers(1, 7))
     gaps = draw(st.lists(st.floats(0.05, 2.0), min_size=levels, max_size=levels))
     count = levels * (levels + 1) // 2
@@ -26,7 +27,11 @@ def operators(draw):
     sign = draw(st.sampled_from([1.0, -1.0]))
     bottom = draw(st.floats(-5.0, 5.0))
     nodes = bottom + np.concatenate(([0.0], np.cumsum(gaps)))
-    return Preisach(nodes, sign * np.array(weights), draw(st.floats(-3.0, 3.0)))
+    line = draw(st.one_of(
+        st.just([0.0] * levels),
+        st.lists(st.sampled_from([0.0, 0.05, 0.7]), min_size=levels, max_size=levels)))
+    return Preisach(
+        nodes, sign * np.array(weights), draw(st.floats(-3.0, 3.0)), sign * np.array(line))
 
 
 @st.composite
@@ -63,7 +68,7 @@ def follow(operator, inputs):
 
 def copy(operator):
     """Return an operator with the same parameters and memory."""
-    twin = Preisach(operator.nodes, operator.weights, operator.bias)
+    twin = operator_from_dict(operator.to_dict())
     twin.restore(operator.save())
     return twin
 
@@ -112,7 +117,7 @@ def test_output_is_monotone_in_the_next_input(data):
     operator = data.draw(operators())
     follow(operator, data.draw(histories(operator)))
     inputs = sorted(data.draw(histories(operator)) + [operator.input])
-    sign = -1.0 if np.any(operator.weights < 0.0) else 1.0
+    sign = math.copysign(1.0, operator.peek(operator.upper) - operator.peek(operator.lower))
     outputs = sign * np.array([operator.peek(u) for u in inputs])
     assert np.all(np.diff(outputs) >= -1e-13 * full(operator))
     low, high = operator.output_range
@@ -153,6 +158,7 @@ def test_between_grid_levels_the_cells_are_relays(data):
     beta, alpha = cells(levels)
     width = np.diff(operator.nodes)
     mass = operator.weights * width[beta] * width[alpha] * np.where(beta == alpha, 0.5, 1.0)
+    mass[beta == alpha] += operator.reversible * width
     relays = np.full(len(mass), -1.0)
     for level in data.draw(st.lists(st.integers(0, levels), max_size=30)):
         relays[alpha < level] = 1.0
@@ -248,10 +254,11 @@ def test_batch_equals_steps(data, worth):
         outputs = twin.simulate(inputs)
     np.testing.assert_allclose(outputs, expected, rtol=0.0, atol=1e-12 * full(operator))
     assert twin.save() == operator.save()
-    rows = Preisach(operator.nodes, operator.weights).areas(inputs)
+    sums = (operator.areas(inputs) @ operator.weights + operator.bias
+            + signed_lengths(operator.nodes, inputs) @ operator.reversible)
     operator.reset()
-    np.testing.assert_allclose(rows @ operator.weights + operator.bias,
-                               follow(operator, inputs), rtol=0.0, atol=1e-12 * full(operator))
+    np.testing.assert_allclose(
+        sums, follow(operator, inputs), rtol=0.0, atol=1e-12 * full(operator))
 
 
 @slow
@@ -259,7 +266,7 @@ def test_batch_equals_steps(data, worth):
 def test_saved_memory_has_the_same_future(data):
     operator = data.draw(operators())
     follow(operator, data.draw(histories(operator)))
-    twin = Preisach(operator.nodes, operator.weights, operator.bias)
+    twin = operator_from_dict(operator.to_dict())
     twin.restore(json.loads(json.dumps(operator.save())))
     future = data.draw(histories(operator))
     assert twin.output == operator.output

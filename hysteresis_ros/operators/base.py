@@ -153,7 +153,8 @@ class HysteresisOperator(abc.ABC):
         dead_band : float
             A move that would reverse the input for an output change of at most this size is
             not made. Costs an output error of at most `dead_band`, until the reference has
-            moved by more. Unit of the output.
+            moved by more. As wide as the noise of the reference from peak to peak it keeps
+            the input still; narrower ones leave reversals in. Unit of the output.
         slope_floor : float
             The input moves at most by output change over `slope_floor`, so that the gain from
             reference to input is at most ``1 / slope_floor`` everywhere, plateaus included.
