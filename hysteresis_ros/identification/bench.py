@@ -132,7 +132,7 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
                 model.force_stage = _first_stage_from_lengths(model, length, rows, levels)
             length_fit = _length_stage(model, length, rows, levels[1], kind, anchored)
     model.linear = _linear(model, force, force_trials, length, length_trials)
-    _measure(model, force, force_trials, length, length_trials)
+    measure(model, force, force_trials, length, length_trials)
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit)
 
@@ -267,8 +267,19 @@ def _linear(model, force, force_trials, length, length_trials):
     return LinearModel(float(-by_drive), 1.0, float(-offset))
 
 
-def _measure(model, force, force_trials, length, length_trials):
-    """Fill in the metrics: errors on fitted and on other trials, of both methods."""
+def measure(model, force, force_trials, length, length_trials):
+    """
+    Fill in the model's metrics: errors on fitted and on other trials, of both methods.
+
+    Parameters
+    ----------
+    model : MuscleModel
+        Whose `metrics` are changed.
+    force, length : Measurement or None
+        The bench tables.
+    force_trials, length_trials : sequence of numbers or None
+        Trials that were fitted.
+    """
     for name, measurement, trials in (('force', force, force_trials),
                                       ('length', length, length_trials)):
         if measurement is None:
