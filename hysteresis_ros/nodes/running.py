@@ -8,9 +8,11 @@ import sys
 from collections.abc import Callable, Sequence
 
 import rclpy
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
 from hysteresis_ros.errors import HysteresisError, ParameterError
+
+ENDING = (signal.SIGINT, signal.SIGTERM)
 
 
 def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
@@ -37,20 +39,25 @@ def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
     """
     node = None
     status = 0
+    # Signals wait until the node is there: half a node could not say its last words.
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     try:
         _start_rclpy(args)
         node = make_node()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
         # What is there now stays for good: collections need not look at it between two messages.
         gc.freeze()
-        rclpy.spin(node)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+        executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
-    except (HysteresisError, OSError) as error:
-        status = _fail(error)
     except RuntimeError:
-        # SIGTERM while the node is being made: rclpy is shut down already and refuses the rest.
+        # SIGTERM shuts rclpy down from a thread of its own, in the middle of anything.
         if rclpy.ok():
             raise
+    except (HysteresisError, OSError) as error:
+        status = _fail(error)
     finally:
         _ignore_signals()
         status = _end(node) or status
@@ -68,8 +75,8 @@ def _start_rclpy(args):
 
 def _ignore_signals():
     """Ctrl-C on ``ros2 launch`` signals every node twice: the second must not cut the end."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _end(node):
