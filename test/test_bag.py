@@ -8,7 +8,7 @@ from types import ModuleType, SimpleNamespace
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import bag_storage, read_measurement, settled_rows
 from hysteresis_ros.measurements.cdr import (
-    decode_diagnostics, decode_float64, decode_joint_state, decode_temperature)
+    decode_diagnostics, decode_float64, decode_joint_state, decode_temperature, JointReader)
 import numpy as np
 import pytest
 
@@ -260,6 +260,19 @@ def test_messages_are_decoded_like_rosbags_does():
         ('hardware_bridge: board', {'port': 'sim://bicep', 'state': 'ready'})]
     big = bytes(STORE.serialize_cdr(voltage(3.5)[1], FLOAT, little_endian=False))
     assert decode_float64(big) == 3.5
+
+
+def test_a_joint_is_read_from_messages_of_changing_shape():
+    reader = JointReader(lambda names: 'elbow')
+    for little in (True, False):
+        for stamp, positions, names in (
+                (1.5, [2.0, 3.0], ('wrist', 'elbow')), (2.5, [4.0, 5.0], ('wrist', 'elbow')),
+                (3.5, [6.0, 7.0], ('elbow', 'wrist')), (4.5, [8.0], ('elbow',)),
+                (5.5, [9.0], ('wrist',)), (6.5, [], ('elbow',)), (7.5, [1.0], ('elbow',))):
+            kind, message = joints(stamp, positions, names)
+            data = bytes(STORE.serialize_cdr(message, kind, little_endian=little))
+            expected = dict(zip(names, positions)).get('elbow')
+            assert reader.read(data) == (stamp, expected)
 
 
 @pytest.mark.parametrize('decode, message', [

@@ -6,6 +6,8 @@ from hysteresis_ros.cli.common import add_model, must_differ
 from hysteresis_ros.errors import MeasurementError, ParameterError, RangeError
 import numpy as np
 
+ROUNDING = 1e-6
+
 
 def add_parser(subparsers):
     """Declare the command."""
@@ -79,7 +81,9 @@ def invert(model, reference, method='preisach'):
             last = model.cold_drive
         try:
             found = setpoint(controller, model, reference, kind, row)
-            last, saturated[row] = found.voltage, found.saturated
+            # A table holds rounded numbers: the very end of the range is still in reach.
+            missed = not abs(found.error) <= ROUNDING * (1e-12 + abs(found.expected))
+            last, saturated[row] = found.voltage, found.saturated and missed
         except RangeError:
             saturated[row] = True
         drive[row] = last

@@ -16,7 +16,7 @@ import warnings
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.bag_storage import open_bag, SUFFIXES
 from hysteresis_ros.measurements.cdr import (
-    decode_diagnostics, decode_float64, decode_joint_state, decode_temperature)
+    decode_diagnostics, decode_float64, decode_temperature, JointReader)
 from hysteresis_ros.measurements.csv import digest
 from hysteresis_ros.measurements.table import Measurement, MeasurementWarning, short_list
 import numpy as np
@@ -171,18 +171,16 @@ def collect(path, bag, topics):
     namespace = topics['joint_states'].rsplit('/', 1)[0].strip('/')
     voltage, angle = (array('q'), array('d')), (array('q'), array('d'), array('d'))
     ambient, state = (array('q'), array('d')), (array('q'), array('d'))
-    joint = None
+    joint = JointReader(lambda names: choose_joint(path, names))
     for topic, received, data in bag.messages(roles):
         role = roles[topic]
         try:
             if role == 'joint_states':
-                stamp, names, positions = decode_joint_state(data)
-                if joint is None:
-                    joint = choose_joint(path, names)
-                if joint in names and names.index(joint) < len(positions):
-                    for column, value in zip(angle, (received, stamp,
-                                                     positions[names.index(joint)])):
-                        column.append(value)
+                stamp, position = joint.read(data)
+                if position is not None:
+                    angle[0].append(received)
+                    angle[1].append(stamp)
+                    angle[2].append(position)
             elif role == 'ambient_temperature':
                 ambient[0].append(received)
                 ambient[1].append(decode_temperature(data)[1])

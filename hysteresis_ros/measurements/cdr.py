@@ -15,6 +15,10 @@ from hysteresis_ros.errors import MeasurementError
 
 MOST_ELEMENTS = 100_000
 
+LITTLE_ENDIAN = b'\x00\x01'
+FLOAT64 = struct.Struct('<d')
+STAMP = struct.Struct('<iI')
+
 
 class CdrReader:
     """
@@ -93,6 +97,8 @@ def decode_float64(data):
     float
 
     """
+    if len(data) == 12 and data[:2] == LITTLE_ENDIAN:
+        return FLOAT64.unpack_from(data, 4)[0]
     return CdrReader(data).float64()
 
 
@@ -117,6 +123,70 @@ def decode_joint_state(data):
     stamp = reader.stamp()
     names = reader.strings()
     return stamp, names, tuple(reader.float64() for _ in range(reader.count()))
+
+
+class JointReader:
+    """
+    Reads one joint's angle from many messages of one publisher.
+
+    Such messages differ in nothing but their stamp and their numbers, so the place of the angle
+    is looked for once and then only checked.
+
+    Parameters
+    ----------
+    choose : callable
+        Given the names of the first message's joints, returns the one to read.
+
+    """
+
+    def __init__(self, choose):
+        self.choose = choose
+        self.joint = None
+        self.length = self.place = 0
+        self.between = b''
+
+    def read(self, data):
+        """
+        Read a message.
+
+        Parameters
+        ----------
+        data : bytes
+
+        Returns
+        -------
+        stamp : float
+            s.
+        angle : float or None
+            rad; None if the message does not have the joint.
+
+        Raises
+        ------
+        MeasurementError
+            If the message cannot be decoded.
+
+        """
+        if (len(data) == self.length and data[:2] == LITTLE_ENDIAN
+                and data[12:12 + len(self.between)] == self.between):
+            seconds, nanoseconds = STAMP.unpack_from(data, 4)
+            return seconds + 1e-9 * nanoseconds, FLOAT64.unpack_from(data, self.place)[0]
+        stamp, names, positions = decode_joint_state(data)
+        if self.joint is None:
+            self.joint = self.choose(names)
+        if self.joint not in names or names.index(self.joint) >= len(positions):
+            return stamp, None
+        self.remember(data, names.index(self.joint))
+        return stamp, positions[names.index(self.joint)]
+
+    def remember(self, data, index):
+        """Note where the angle lies in messages like this one."""
+        reader = CdrReader(data)
+        reader.stamp()
+        reader.strings()
+        reader.count()
+        self.between = bytes(data[12:reader.position])
+        self.place = reader.position + (4 - reader.position) % 8 + 8 * index
+        self.length = len(data)
 
 
 def decode_temperature(data):

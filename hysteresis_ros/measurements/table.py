@@ -226,7 +226,8 @@ def classify(columns, source):
     response = next((name for name in RESPONSES if name in columns), None)
     for found, names, role in ((drive, DRIVES, 'drive'), (response, RESPONSES, 'response')):
         if found is None:
-            close = [(name, closest(name, columns)) for name in names if closest(name, columns)]
+            strange = [name for name in columns if not is_known(name)]
+            close = [(name, closest(name, strange)) for name in names if closest(name, strange)]
             hint = (f'is {close[0][1]!r} meant to be {close[0][0]!r}? Rename it' if close
                     else f'the columns are {short_list(columns)}')
             raise MeasurementError(
@@ -452,7 +453,7 @@ def is_known(name):
     return name in QUANTITIES or name in ('trial', 'step')
 
 
-def closest(name, columns, similarity=0.7):
+def closest(name, columns, similarity=0.6):
     """Return the column whose name is most like this one, or None."""
     lowered = {str(column).lower(): column for column in columns}
     matches = difflib.get_close_matches(name.lower(), lowered, 1, similarity)
