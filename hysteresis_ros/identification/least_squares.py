@@ -23,12 +23,18 @@ equally well (`slack`).
 """
 
 from dataclasses import dataclass
+import functools
 from typing import Optional, Sequence
 
 import numpy as np
-from scipy import linalg, optimize, stats
+from scipy import linalg, optimize
 
 from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.identification.nonnegative import quick_weights, solve_nonnegative
+from hysteresis_ros.identification.weight_fit import WeightFit
+
+__all__ = ['Anchor', 'SLACK', 'STRENGTHS', 'WeightFit', 'fit_weights', 'folds_of',
+           'quick_weights', 'solve_nonnegative']
 
 STRENGTHS = np.logspace(-9.0, -2.0, 15)
 # Weights fit equally well if their RMSE is larger by at most this share of the output range plus
@@ -37,7 +43,6 @@ SLACK = 2.5e-4, 0.01
 BLOCKS = 5          # blocks of steps held out in turn when there is one trial only
 FOLDS = 8           # more trials than this share folds, so that the time stays bounded
 ANCHOR_GAIN = 1e3   # an anchor counts as much as this many times all rows together
-_TOLERANCE = 1e-11  # of the largest gradient; signs below it are rounding
 
 
 @dataclass(frozen=True)
@@ -55,217 +60,6 @@ class Anchor:
 
     row: np.ndarray
     value: float
-
-
-@dataclass(frozen=True)
-class WeightFit:
-    """
-    Identified weights and what the data says about them.
-
-    Attributes
-    ----------
-    weights : ndarray, shape (K,)
-        All >= 0 when `sign` is 1, all <= 0 when it is -1.
-    bias : float
-        Output where every row entry is zero, in the unit of the target.
-    sign : int
-        1 or -1.
-    strength : float
-        Strength of the penalty; 0 for the paper's plain problem.
-    strengths, validation : ndarray, shape (S,)
-        Strengths tried and the held-out RMSE at each, in the unit of the target.
-    fitted, residual : ndarray, shape (M,)
-        Output at the rows of the fit, and output minus target.
-    output_range : float
-        P of Eqs. 23 and 24.
-    rank : int
-        Rank of rows and bias together; below K + 1 the plain problem has no unique solution.
-    condition : float
-        Largest over smallest singular value within that rank.
-    never_excited : tuple of int
-        Columns that are constant along the data: nothing was learned about their weights.
-    noise_std : float
-        Standard deviation of one output about the prediction: from held-out rows, or from the
-        residual and its degrees of freedom where nothing was held out.
-    active : ndarray of int
-        Weights off their bound, and last the bias.
-    covariance : ndarray
-        Of those, for a unit `noise_std`.
-    """
-
-    weights: np.ndarray
-    bias: float
-    sign: int
-    strength: float
-    strengths: np.ndarray
-    validation: np.ndarray
-    fitted: np.ndarray
-    residual: np.ndarray
-    output_range: float
-    rank: int
-    condition: float
-    never_excited: tuple
-    noise_std: float
-    active: np.ndarray
-    covariance: np.ndarray
-
-    @property
-    def mean_percent(self) -> float:
-        """Mean absolute error in percent of the output range (Eq. 23)."""
-        return float(100.0 * np.mean(np.abs(self.residual)) / self.output_range)
-
-    @property
-    def std_percent(self) -> float:
-        """Standard deviation of the error in percent of the output range (Eq. 24 over M)."""
-        return float(100.0 * np.std(self.residual) / self.output_range)
-
-    @property
-    def rmse(self) -> float:
-        """Root mean square error in the unit of the target."""
-        return float(np.sqrt(np.mean(self.residual ** 2)))
-
-    def predict(self, rows: np.ndarray) -> np.ndarray:
-        """Return the output at `rows`, shape (m, K) -> (m,)."""
-        return np.asarray(rows) @ self.weights + self.bias
-
-    def prediction_interval(self, rows: np.ndarray, level: float = 0.95) -> tuple:
-        """
-        Return (low, high), each shape (m,), that hold one new output with probability `level`.
-
-        A linear Gaussian posterior over the weights that are not at their bound. Its variance
-        is scaled so that it explains the held-out errors, which contain the structural error
-        of the model as well as the noise.
-        """
-        rows = np.asarray(rows, dtype=float)
-        design = np.column_stack([rows, np.ones(len(rows))])[:, self.active]
-        spread = np.einsum('mi,ij,mj->m', design, self.covariance, design)
-        freedom = max(1, len(self.residual) - 1)
-        half = (stats.t.ppf(0.5 + 0.5 * level, freedom) * self.noise_std
-                * np.sqrt(1.0 + np.maximum(spread, 0.0)))
-        centre = self.predict(rows)
-        return centre - half, centre + half
-
-    def summary(self) -> dict:
-        """Return the numbers of the fit as plain types for JSON and YAML."""
-        return {
-            'rows': int(len(self.residual)),
-            'unknowns': int(len(self.weights)) + 1,
-            'sign': int(self.sign),
-            'mean_abs': float(np.mean(np.abs(self.residual))),
-            'std': float(np.std(self.residual)),
-            'rmse': self.rmse,
-            'mean_percent': self.mean_percent,
-            'std_percent': self.std_percent,
-            'output_range': float(self.output_range),
-            'bias': float(self.bias),
-            'rank': int(self.rank),
-            'condition': float(self.condition),
-            'never_excited': [int(k) for k in self.never_excited],
-            'strength': float(self.strength),
-            'cross_validation': [
-                {'strength': float(s), 'rmse': float(v)}
-                for s, v in zip(self.strengths, self.validation)],
-            'noise_std': float(self.noise_std),
-        }
-
-
-def solve_nonnegative(
-        gram: np.ndarray, moment: np.ndarray, free: np.ndarray,
-        start: Optional[np.ndarray] = None) -> tuple:
-    """
-    Minimise x @ gram @ x / 2 - moment @ x with x >= 0 except where `free`.
-
-    Block principal pivoting (Portugal, Judice and Vicente 1994; Kim and Park 2011): unknowns of
-    the wrong sign change sides together, one at a time when that stops helping, which makes it
-    finite for a positive definite `gram`. It is much faster than adding unknowns one by one, and
-    a solution for a neighbouring problem is a good start.
-
-    Parameters
-    ----------
-    gram : ndarray, shape (K, K)
-        Symmetric positive definite.
-    moment : ndarray, shape (K,)
-    free : ndarray of bool, shape (K,)
-        Unknowns without a bound.
-    start : ndarray of bool, shape (K,), optional
-        Unknowns that are probably not at their bound.
-
-    Returns
-    -------
-    x : ndarray, shape (K,)
-    passive : ndarray of bool, shape (K,)
-        Unknowns that are not at their bound.
-
-    Raises
-    ------
-    IdentificationError
-        When `gram` is not positive definite or no solution is found.
-    """
-    size = len(moment)
-    passive = free.copy() if start is None else (start | free)
-    fewest, tries = size + 1, 3
-    gradient_tolerance = _TOLERANCE * max(float(np.max(np.abs(moment))), 1e-300)
-    for _ in range(20 * size):
-        index = np.flatnonzero(passive)
-        x = np.zeros(size)
-        try:
-            factor = linalg.cho_factor(gram[np.ix_(index, index)], check_finite=False)
-        except linalg.LinAlgError:
-            raise IdentificationError(
-                'least squares: the problem is singular; use a strength above 0') from None
-        x[index] = linalg.cho_solve(factor, moment[index], check_finite=False)
-        gradient = gram @ x - moment
-        wrong = (passive & ~free & (x < -1e-12 * np.max(np.abs(x)))) | (
-            ~passive & (gradient < -gradient_tolerance))
-        count = int(np.count_nonzero(wrong))
-        if count == 0:
-            return np.where(passive, x, 0.0), passive
-        if count < fewest:
-            fewest, tries = count, 3
-        elif tries > 0:
-            tries -= 1
-        else:
-            last = np.flatnonzero(wrong)[-1]
-            wrong = np.zeros(size, dtype=bool)
-            wrong[last] = True
-        passive = passive ^ wrong
-    raise IdentificationError(
-        'least squares: no solution found; use a larger strength or fewer levels')
-
-
-def quick_weights(rows: np.ndarray, target: np.ndarray, scale: np.ndarray, strength: float,
-                  start: Optional[np.ndarray] = None) -> tuple:
-    """
-    Solve the regularised problem of `fit_weights` (ridge, weights >= 0) and nothing else.
-
-    For searches that solve thousands of neighbouring problems.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (M, K)
-    target : ndarray, shape (M,)
-    scale : ndarray, shape (K,)
-        Size of every column.
-    strength : float
-        Of the penalty, above 0.
-    start : ndarray of bool, shape (K + 1,), optional
-        Third result of a neighbouring problem.
-
-    Returns
-    -------
-    weights : ndarray, shape (K,)
-    bias : float
-    passive : ndarray of bool, shape (K + 1,)
-    """
-    span = max(float(np.ptp(target)), 1e-300)
-    design = np.column_stack([rows / scale, np.ones(len(target))])
-    gram = design.T @ design / len(target)
-    size = len(gram)
-    gram[np.arange(size - 1), np.arange(size - 1)] += strength
-    free = np.zeros(size, dtype=bool)
-    free[-1] = True
-    x, passive = solve_nonnegative(gram, design.T @ target / (len(target) * span), free, start)
-    return x[:-1] * span / scale, float(x[-1] * span), passive
 
 
 def folds_of(groups: np.ndarray) -> list:
@@ -408,14 +202,23 @@ class _Problem:
         """Mark the bias, the one unknown without a bound."""
         return np.arange(len(self.unit)) == len(self.unit) - 1
 
+    @functools.cached_property
+    def _reduced(self) -> tuple:
+        """Mean square problem with no more rows than unknowns, by one QR: (design, target)."""
+        root = np.sqrt(len(self.target))
+        design = np.vstack([self.design / root, self.extra[:, :-1]])
+        target = np.append(self.target / root, self.extra[:, -1])
+        if len(target) <= design.shape[1]:
+            return design, target
+        orthogonal, triangle = linalg.qr(design, mode='economic')
+        return triangle, orthogonal.T @ target
+
     def plain(self) -> WeightFit:
         """Solve the paper's problem: no penalty, bias as the difference of two columns."""
-        design = np.vstack([self.design / np.sqrt(len(self.target)), self.extra[:, :-1]])
-        target = np.append(self.target / np.sqrt(len(self.target)), self.extra[:, -1])
+        design, target = self._reduced
         design = np.column_stack([design, -design[:, -1]])
-        triangle, rotated = _reduce(design, target)
         try:
-            x, _ = optimize.nnls(triangle, rotated, maxiter=30 * design.shape[1])
+            x, _ = optimize.nnls(design, target, maxiter=30 * design.shape[1])
         except RuntimeError:
             raise IdentificationError(
                 'least squares: nnls did not converge; use a strength above 0') from None
@@ -467,7 +270,7 @@ class _Problem:
         x = self._polish(x, passive, strength)
         covariance = linalg.inv(len(self.target) * gram[np.ix_(passive, passive)])
         block = self.design[:, passive]
-        leverage = np.einsum('mi,ij,mj->m', block, covariance, block)
+        leverage = np.sum((block @ covariance) * block, axis=1)
         if held_out is not None:
             noise = float(np.sqrt(np.mean(held_out ** 2 / (1.0 + leverage))))
         else:
@@ -478,18 +281,17 @@ class _Problem:
 
     def _polish(self, x: np.ndarray, passive: np.ndarray, strength: float) -> np.ndarray:
         """Solve again for the unknowns off their bound, without squaring the condition."""
-        root = np.sqrt(len(self.target))
-        design = np.vstack([self.design / root, self.extra[:, :-1],
-                            np.sqrt(strength) * self.penalty])[:, passive]
-        target = np.concatenate([self.target / root, self.extra[:, -1],
-                                 np.zeros(len(self.penalty))])
+        triangle, rotated = self._reduced
+        design = np.vstack([triangle, np.sqrt(strength) * self.penalty])[:, passive]
+        target = np.append(rotated, np.zeros(len(self.penalty)))
         polished = np.zeros_like(x)
         polished[passive] = linalg.lstsq(design, target, lapack_driver='gelsy')[0]
         return np.where(self.free, polished, np.maximum(polished, 0.0))
 
     def _result(self, x, passive, covariance, noise, strength, strengths, validation):
         values = x * self.unit
-        singular = np.linalg.svd(self.design, compute_uv=False)
+        triangle = self._reduced[0]
+        singular = np.linalg.svd(triangle, compute_uv=False)
         rank = int(np.count_nonzero(
             singular > singular[0] * max(self.design.shape) * np.finfo(float).eps))
         still = np.ptp(self.design[:, :-1], axis=0) <= 1e-12
@@ -504,11 +306,3 @@ class _Problem:
             never_excited=tuple(int(k) for k in np.flatnonzero(still)),
             noise_std=noise * self.output_range, active=np.flatnonzero(passive),
             covariance=covariance * scaled)
-
-
-def _reduce(design: np.ndarray, target: np.ndarray) -> tuple:
-    """Return an equivalent problem with no more rows than unknowns, by one QR."""
-    if len(target) <= design.shape[1]:
-        return design, target
-    orthogonal, triangle = linalg.qr(design, mode='economic')
-    return triangle, orthogonal.T @ target
