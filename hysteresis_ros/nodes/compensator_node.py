@@ -8,8 +8,9 @@ hysteresis stages: each reference moves it once, in the order of arrival. While 
 the last setpoint is repeated, which does not move the memory, so that the watchdog behind
 `voltage_setpoint` does not end a long hold.
 
-When the bridge's ``~/initialise`` has heated and cooled the muscle, call this node's ``~/reset``:
-the muscle's memory is wiped then, and the model's has to follow.
+Before the bridge's ``~/initialise`` heats and cools the muscle, call this node's ``~/reset``: the
+muscle's memory is wiped then, and the model's has to follow. A reset also ends the repeating, so
+nothing warms the muscle again between the cycle's end and the next reference.
 """
 
 import math

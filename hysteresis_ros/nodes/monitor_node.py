@@ -8,7 +8,8 @@ Subscribes `applied_voltage` and `joint_states`; for each measured angle it publ
 prediction uses the applied voltage alone, never the measured angle, so that the residual shows the
 model's error as it grows.
 
-When the bridge's ``~/initialise`` has heated and cooled the muscle, call this node's ``~/reset``.
+When the bridge's ``~/initialise`` has heated and cooled the muscle, call this node's ``~/reset``;
+a model of the whole voltage range has its memory wiped by the cycle itself, as the muscle has.
 """
 
 import dataclasses
@@ -29,6 +30,8 @@ from hysteresis_ros.nodes.running import run
 MONITORING = (
     Spec('residual_limit', 0.1, 'Difference between measurement and model that is reported as a '
          'warning', 'rad', 0.0, 3.2),
+    Spec('residual_time', 10.0, 'Time that such a difference has to last: an arm on its way lags '
+         'behind a model at rest', 's', 0.0, 600.0),
 )
 
 
@@ -50,14 +53,13 @@ class MonitorNode(Node):
 
     def __init__(self, model=None, **options):
         super().__init__('model_monitor', **options)
-        parameters = Parameters(self, self.PARAMETERS, check=BicepGeometry.from_mapping,
-                                changed=self._configure)
+        parameters = self._parameters = Parameters(
+            self, self.PARAMETERS, check=BicepGeometry.from_mapping)
         model = model or load_model(parameters['model_file'], parameters, self.get_logger())
         self._observer = model.observer()
         self._voltage = self._ambient = self._residual = math.nan
-        self._start = self._time = None
+        self._start = self._time = self._fine_until = None
         self._measured = self._predicted = 0
-        self._configure(parameters)
         self._diagnostics = Diagnostics(
             self, parameters['hardware_id'], self._values, 'following the arm')
         self._prediction = self.create_publisher(
@@ -70,9 +72,6 @@ class MonitorNode(Node):
             self.create_subscription(
                 Temperature, 'ambient_temperature', self._on_ambient, MEASUREMENTS)
         self.create_service(Trigger, '~/reset', self._on_reset)
-
-    def _configure(self, parameters):
-        self._joint, self._limit = parameters['joint_name'], parameters['residual_limit']
 
     def _forget(self):
         self._observer.reset()
@@ -87,7 +86,7 @@ class MonitorNode(Node):
 
     def _on_joint_states(self, message):
         self._measured += 1
-        angle = read_angle(message, self._joint)
+        angle = read_angle(message, self._parameters['joint_name'])
         if angle is None or not math.isfinite(angle) or not math.isfinite(self._voltage):
             return
         time = seconds(message.header.stamp)
@@ -97,11 +96,11 @@ class MonitorNode(Node):
         elif self._time is not None:
             self._diagnostics.clear('clock')
         if self._start is None:
-            self._start = time
+            self._start = self._fine_until = time
         self._time = time
         predicted = self._observer.step(time - self._start, self._voltage, self._ambient)
         self._residual = angle - predicted
-        output = JointState(name=[self._joint], position=[predicted])
+        output = JointState(name=[self._parameters['joint_name']], position=[predicted])
         output.header.stamp = message.header.stamp
         self._prediction.publish(output)
         self._difference.publish(Float64(data=self._residual))
@@ -109,13 +108,16 @@ class MonitorNode(Node):
         self._judge()
 
     def _judge(self):
-        if abs(self._residual) > self._limit:
+        limit, time = self._parameters['residual_limit'], self._parameters['residual_time']
+        if abs(self._residual) <= limit:
+            self._fine_until = self._time
+            # Half the limit: a residual near it is not to come and go with each sample.
+            if abs(self._residual) <= 0.5 * limit:
+                self._diagnostics.clear('residual')
+        elif self._time - self._fine_until >= time:
             self._diagnostics.set('residual', WARN, (
-                f'the arm is {self._residual:+.3f} rad off the model, more than '
-                f'{self._limit:g} rad; record a run and try `hysteresis diagnose`'))
-        # Half the limit: a residual near it is not to come and go with each sample.
-        elif abs(self._residual) <= 0.5 * self._limit:
-            self._diagnostics.clear('residual')
+                f'the arm has been more than {limit:g} rad off the model for {time:g} s, now '
+                f'{self._residual:+.3f} rad; record a run and try `hysteresis diagnose`'))
 
     def _on_reset(self, request, response):
         self._forget()
