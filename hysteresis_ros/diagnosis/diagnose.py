@@ -189,10 +189,13 @@ class _Diagnostician:
         return seeds + better[:MOST_SEEDS - len(seeds)]
 
     def _few(self, first):
-        """Effects of which sets are made on the bench: those that help by themselves."""
-        return [candidate.effect for candidate in first
-                if candidate.p_value <= SIGNIFICANCE
-                and candidate.rmse < (1.0 - PRACTICAL) * self.before][:MOST_IN_SETS]
+        """
+        Effects of which sets are made on the bench: those that fit best by themselves.
+
+        They need not help by themselves: the paper's first stage already does a part of what a
+        load does, so that one effect of the load alone may well make it worse.
+        """
+        return [candidate.effect for candidate in first][:MOST_IN_SETS]
 
     def _helps(self, fit) -> bool:
         """Whether a set of effects explains more than chance, of mostly one sign."""

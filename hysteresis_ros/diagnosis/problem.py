@@ -15,10 +15,11 @@ import numpy as np
 from hysteresis_ros.diagnosis.structure import Offset
 from hysteresis_ros.effects import SensorEffect
 from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.identification.least_squares import fit_weights, quick_weights
+from hysteresis_ros.identification.least_squares import SLACK, fit_weights, quick_weights
+from hysteresis_ros.identification.operators import preisach_rows, smoothness
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.simulation import Simulator, turning_rows
-from hysteresis_ros.operators import Preisach, cell_areas, signed_areas
+from hysteresis_ros.operators import Preisach, cell_areas
 
 # A long recording is judged on about this many rows; between them nothing new is learned. Weights
 # that are refitted again and again ask for fewer.
@@ -26,10 +27,9 @@ MOST_ROWS = {'arm': 1500, 'bench': 400}
 MOST_FOLDS = 4
 # Blocks for significance: about this many a recording.
 BLOCKS = 24
-# Strengths of the weights' regularisation that are tried when weights are refitted.
-STRENGTHS = (1e-6, 1e-5, 1e-4, 1e-3)
-# And the one at which sets of effects are compared; a wrong base would ask for too much of it.
-SEARCH_STRENGTH = 1e-4
+# Strength of the weights' regularisation at which sets of effects are compared; the base model's
+# own would hide what a better one can do.
+SEARCH_STRENGTH = 1e-5
 
 
 def sensor_resolution(measurement) -> float:
@@ -171,7 +171,7 @@ class ArmProblem(Problem):
             moved = simulator.run([*effects, Offset(step)])
             areas = np.concatenate([
                 np.apply_along_axis(lambda column: np.interp(
-                    np.arange(count), chosen, column), 0, signed_areas(stage.nodes, u))
+                    np.arange(count), chosen, column), 0, preisach_rows(stage.nodes, u, True))
                 for u, chosen, count in inputs])
             columns.append((((moved - base) / step)[:, None] * areas)[rows])
         return np.concatenate(columns)
@@ -200,6 +200,7 @@ class BenchProblem(Problem):
                                    'two-stage or preisach')
         self.levels = len(stage.nodes) - 1
         self._passive = None
+        self._square = None
 
     def _design(self, effects) -> Design:
         model = self.model
@@ -267,7 +268,8 @@ class BenchProblem(Problem):
         groups = self.trial if len(np.unique(self.trial[train])) > 1 else self.block
         fit = fit_weights(
             design.rows[train], (self.measured - design.known)[train], groups=groups[train],
-            scale=2.0 * cell_areas(design.nodes), strength=strength, strengths=STRENGTHS)
+            scale=_scale(design.nodes), strength=strength, slack=SLACK,
+            penalty=smoothness(design.nodes, reversible=True))
         return fit, design
 
     def simulate(self, effects, train=None) -> np.ndarray:
@@ -277,12 +279,19 @@ class BenchProblem(Problem):
         # Neighbouring parameters have neighbouring weights.
         weights, bias, self._passive = quick_weights(
             design.rows[rows], (self.measured - design.known)[rows],
-            2.0 * cell_areas(design.nodes), SEARCH_STRENGTH, self._passive)
+            _scale(design.nodes), self._penalty(design.nodes), self._passive)
         response = design.rows @ weights + bias + design.known
         for effect in effects:
             if isinstance(effect, SensorEffect):
                 response = self._sensed(effect, response)
         return response
+
+    def _penalty(self, nodes):
+        """Square of the penalty; it is the same for all grids of equal intervals."""
+        if self._square is None:
+            root = smoothness(nodes, reversible=True)
+            self._square = SEARCH_STRENGTH * root.T @ root
+        return self._square
 
     def _sensed(self, effect, response):
         sensed = response.copy()
@@ -300,19 +309,25 @@ class BenchProblem(Problem):
     def completed(self, effects):
         """Return the model with these effects and H2's weights refitted to all rows."""
         fit, design = self.fit_stage(effects)
-        bias = fit.bias + float(fit.weights @ cell_areas(design.nodes))
-        return dataclasses.replace(
-            self.model, effects=list(effects),
-            length_stage=Preisach(design.nodes, fit.weights, bias))
+        scale = _scale(design.nodes)
+        count = len(cell_areas(design.nodes))
+        stage = Preisach(design.nodes, fit.weights[:count], fit.bias + float(fit.weights @ scale),
+                         fit.weights[count:])
+        return dataclasses.replace(self.model, effects=list(effects), length_stage=stage)
 
 
 def _areas(nodes, part, keep):
-    """Areas above the cold state, (rows, K), of the kept rows; the first input is the cold one."""
+    """Areas above saturation, (rows, K + N), of the kept rows; the first input is the cold one."""
     wanted = np.zeros(len(part), dtype=bool)
     wanted[keep + 1] = True
     needed = wanted | turning_rows(part)
-    areas = signed_areas(nodes, part[needed]) + cell_areas(nodes)
-    return areas[wanted[needed]]
+    rows = preisach_rows(nodes, part[needed], reversible=True) + _scale(nodes)
+    return rows[wanted[needed]]
+
+
+def _scale(nodes):
+    """Sizes of the cells and, for the reversible weights, of the intervals, shape (K + N,)."""
+    return np.append(cell_areas(nodes), np.diff(nodes))
 
 
 def problem_for(model, measurements) -> Problem:
