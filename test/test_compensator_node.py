@@ -14,9 +14,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.nodes.compensator_node import CompensatorNode
 from hysteresis_ros.nodes.feedback import AngleFeedback
+from hysteresis_ros.nodes.reference import ArmReference
 
 # Angles that the small muscle of the tests reaches.
 LOW, HIGH = 1.5, 1.95
@@ -232,6 +234,32 @@ def test_feedback_takes_out_what_the_model_does_not_know(graph):
     assert muscle.voltages[-1] > first
     values = {pair.key: pair.value for pair in muscle.status(b'\0').values}
     assert values['references received'] == values['setpoints published'] == '1'
+
+
+def test_feedback_rests_while_the_muscle_is_at_its_limit(graph):
+    """Already at the largest voltage, so asking for more would only wind the integral up."""
+    muscle = Muscle(graph, feedback=True, republish_period=0.0, maximum_voltage=5.0)
+    muscle.ask(1.3)
+    assert muscle.wait(1) == [5.0]
+    arm = Arm(graph, muscle, 0.0)
+    arm.advance(10)
+    assert arm.angle - 1.3 > 0.05
+    assert muscle.voltages == [5.0]
+
+
+def test_target_angle_is_recovered_from_the_reference():
+    """Also where the encoder shows something else, and without a trace in the friction's state."""
+    surroundings = small_model().surroundings
+    model = small_model([catalogue()['encoder_offset'](surroundings, offset=3.0),
+                         catalogue()['geometry_error'](surroundings, dx=2.0),
+                         catalogue()['coulomb_friction'](surroundings, tau_c=0.02)])
+    arm, alone = (ArmReference(GEOMETRY_OF_TESTS, model) for _ in range(2))
+    for angle in (1.7, 1.9, 1.6, 1.6, 1.8):
+        reference = arm.reference(angle)
+        assert reference == alone.reference(angle)
+        assert arm.angle(reference.length) == pytest.approx(angle, abs=1e-6)
+    plain = ArmReference(GEOMETRY_OF_TESTS)
+    assert plain.angle(GEOMETRY_OF_TESTS.reference(1.7).length) == pytest.approx(1.7, abs=1e-12)
 
 
 def test_feedback_integral():
