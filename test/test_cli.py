@@ -382,7 +382,7 @@ def test_real_measurements_are_identified_and_compared(tmp_path, name, operator,
     assert main(['identify', '--length', str(DATA / name), '--operator', operator, '-o',
                  f'{tmp_path}/m.yaml']) == 0
     assert main(['compare', '--model', f'{tmp_path}/m.yaml', '--data', str(DATA / name), '--json',
-                 f'{tmp_path}/j.json', '--report', f'{tmp_path}/r.html']) == 0
+                 f'{tmp_path}/j.json']) == 0
     content = json.loads((tmp_path / 'j.json').read_text())
     assert MuscleModel.load(tmp_path / 'm.yaml').kind == kind
     assert content['model']['mean_abs'] < better * content['linear']['mean_abs']

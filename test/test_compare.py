@@ -6,7 +6,7 @@ import dataclasses
 import json
 from types import SimpleNamespace
 
-from hysteresis_ros.diagnosis.compare import compare, ladder
+from hysteresis_ros.diagnosis.compare import bench_effects, compare, ladder
 from hysteresis_ros.diagnosis.signals import changes, signals_of
 from hysteresis_ros.diagnosis.where import (
     binned, blocks_of, correlogram, half_width, memory, number, placed)
@@ -157,11 +157,18 @@ def test_each_extension_is_a_row():
 
 def test_effects_of_the_bench_fit_are_in_every_row():
     effects = [effect('stress_dependence', 0.01), effect('payload_error', 0.02)]
-    model = FakeModel(effects=effects, provenance={'bench_effects': ['stress_dependence']})
+    model = FakeModel(effects=effects, provenance={'length': {'sha256': 'ab'}, 'extended': [
+        {'effects': ['stress_dependence'], 'data': [{'source': 'length.csv', 'sha256': 'ab'}]},
+        {'effects': ['payload_error'], 'data': [{'source': 'run.csv', 'sha256': 'cd'}]}]})
     stages = ladder(model)
     assert [name for name, _ in stages] == ['two-stage + stress_dependence', '+ payload_error']
     assert [e.id for e in stages[0][1].effects] == ['stress_dependence']
     assert stages[1][1] is model
+    assert bench_effects({'extended': [
+        {'effects': ['a'], 'data': []}, {'effects': ['b'], 'kind': 'bench', 'data': []},
+        {'effects': ['c'], 'kind': 'arm', 'data': []}]}) == {'a', 'b'}
+    assert bench_effects({'extended': [{'effects': ['a'], 'data': [{'sha256': ''}]}],
+                          'length': {'sha256': ''}}) == set()
 
 
 def test_several_recordings_are_one_comparison():

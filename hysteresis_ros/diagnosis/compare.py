@@ -274,7 +274,7 @@ def ladder(model):
         bench fit, whose weights belong to them, are in all of them.
 
     """
-    fitted = set(model.provenance.get('bench_effects', ()))
+    fitted = bench_effects(model.provenance)
     base = [effect for effect in model.effects if effect.id in fitted]
     added = [effect for effect in model.effects if effect.id not in fitted]
     name = ' + '.join([model.kind, *(effect.id for effect in base)])
@@ -284,6 +284,32 @@ def ladder(model):
         stages.append((f'+ {effect.id}',
                        model if n == len(added) else model.with_effects(chosen)))
     return stages
+
+
+def bench_effects(provenance):
+    """
+    Return the effects whose parameters were fitted together with the weights of the bench.
+
+    Parameters
+    ----------
+    provenance : dict
+        Of a model.
+
+    Returns
+    -------
+    set of str
+        Those of every extension up to the last one on a bench table: it refitted the weights
+        with all that was there.
+
+    """
+    bench = {provenance.get(name, {}).get('sha256') for name in ('length', 'force')} - {None, ''}
+    found, so_far = set(), set()
+    for extension in provenance.get('extended', ()):
+        so_far |= set(extension['effects'])
+        if extension.get('kind') == 'bench' or any(
+                data.get('sha256') in bench for data in extension.get('data', ())):
+            found = set(so_far)
+    return found
 
 
 def common_signals(model, measurements, predictions):
@@ -300,7 +326,7 @@ def common_signals(model, measurements, predictions):
 
 
 def trial_numbers(measurements):
-    """Number the trials of all recordings from 0, ndarray of int (rows,)."""
+    """Return the number of each row's trial over all recordings, ndarray of int (rows,)."""
     sizes = [rows.stop - rows.start for m in measurements for _, rows in m.split()]
     return np.repeat(np.arange(len(sizes)), sizes)
 

@@ -235,6 +235,10 @@ def against(axis, comparison, name, values, residual, block):
     limit = 1.1 * max(largest if largest < 3 * spread else spread, spread, 1e-12)
     axis.set_ylim(-limit, limit)
     axis.set_xlabel(axis_label(name), fontsize=8)
+    low, high = np.quantile(values, [0.005, 0.995])
+    if np.ptp(values) > 3 * (high - low) > 0:
+        # A few rows far out, as a rate has at steps, would press all others together.
+        axis.set_xlim(*scaled(name, np.array([1.1 * low - 0.1 * high, 1.1 * high - 0.1 * low])))
     if name == 'direction':
         axis.set_xticks([-1, 1], ['falling', 'rising'])
         axis.set_xlim(-1.5, 1.5)

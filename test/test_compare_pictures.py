@@ -1,0 +1,112 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The pictures and the page of a comparison."""
+
+import base64
+import io
+import re
+
+from hypothesis import given, strategies
+from hysteresis_ros.diagnosis import page
+from hysteresis_ros.diagnosis.compare import compare
+from hysteresis_ros.diagnosis.compare_page import comparison_page, rendered, summary
+from hysteresis_ros.diagnosis.plots import along, figures, new_figure, png, thinned
+import numpy as np
+import pytest
+from test_compare import FakeModel, run
+
+matplotlib = pytest.importorskip('matplotlib')
+pytest.importorskip('matplotlib.image')
+
+
+@pytest.fixture(scope='module')
+def comparison():
+    """Return a comparison of a continuous run with ambient temperature."""
+    rows = 20 * 60 * 5
+    return compare(FakeModel(), [run(lambda t, v, up: 0.03 * (v > 4), extra={
+        'ambient_temperature': np.linspace(20, 25, rows)})])
+
+
+def test_every_picture_of_a_continuous_run(comparison):
+    drawn = figures(comparison)
+    assert set(drawn) == {'overlay', 'signals', 'loop', 'correlogram', 'coverage'}
+    for name, data in rendered(drawn).items():
+        image = matplotlib.image.imread(io.BytesIO(data), format='png')
+        assert image.shape[1] > 300 and image[..., :3].std() > 0.02, name
+
+
+def test_overlay_shows_measured_predicted_and_residual_in_degrees(comparison):
+    axes = figures(comparison)['overlay'].axes
+    labels = [line.get_label() for line in axes[0].lines]
+    assert {'measured', 'two-stage', 'linear'} <= set(labels)
+    assert axes[0].get_ylabel() == 'angle [deg]'
+    line = axes[0].lines[labels.index('measured')]
+    assert line.get_ydata().max() == pytest.approx(np.rad2deg(comparison.measured.max()))
+    grey = sorted(np.dot(matplotlib.colors.to_rgb(line.get_color()), [0.3, 0.59, 0.11])
+                  for line in axes[0].lines[:3])
+    assert np.all(np.diff(grey) > 0.15)
+
+
+def test_a_bench_table_has_its_plane(comparison):
+    from hysteresis_ros.measurements import Measurement
+    drive = np.tile(np.linspace(0, 6, 20), 3)
+    table = Measurement.from_columns({
+        'voltage': drive, 'length': 2 - 0.1 * drive, 'force': np.repeat([1.0, 2, 3], 20)})
+    drawn = figures(compare(FakeModel(linear=None), [table]))
+    assert 'plane' in drawn and 'since_step' not in drawn
+    assert drawn['plane'].axes[0].get_ylabel() == 'force [N]'
+    assert png(drawn['overlay']).startswith(b'\x89PNG')
+
+
+def test_a_single_row_is_drawn():
+    from hysteresis_ros.measurements import Measurement
+    table = Measurement.from_columns({'time': [0.0], 'voltage': [1.0], 'angle': [1.8]})
+    assert all(data.startswith(b'\x89PNG')
+               for data in rendered(figures(compare(FakeModel(), [table]))).values())
+
+
+@given(strategies.integers(5000, 30000), strategies.integers(0, 4000))
+def test_thinning_keeps_the_extremes(rows, seed):
+    y = np.random.default_rng(seed).standard_normal(rows)
+    x = np.arange(rows, dtype=float)
+    few_x, few = thinned(x, y, 1000)
+    assert len(few) <= 1010
+    assert few.max() == y.max() and few.min() == y.min()
+    assert few_x[0] == 0 and few_x[-1] == rows - 1
+    assert np.all(np.diff(few_x) > 0)
+    np.testing.assert_array_equal(few, y[few_x.astype(int)])
+
+
+def test_time_is_shown_in_a_fitting_unit(comparison):
+    assert along(comparison)[1] == 'time [min]'
+
+
+def test_the_page_says_the_verdict_and_holds_the_pictures(comparison):
+    drawn = rendered(figures(comparison))
+    html = comparison_page(comparison, drawn, '<b>model</b>.yaml')
+    assert '&lt;b&gt;model&lt;/b&gt;.yaml' in html and '<b>' not in html
+    pictures = re.findall(r'src="data:image/png;base64,([^"]+)"', html)
+    assert {base64.b64decode(p) for p in pictures} == set(drawn.values())
+    assert html.startswith('<!DOCTYPE html>') and html.count('<h1>') == 1
+    assert summary(comparison) in html.replace('&#x27;', "'")
+    assert '° ' not in summary(comparison)
+    assert 'deg' in summary(comparison) and 'linear' in summary(comparison)
+
+
+@given(strategies.text())
+def test_every_part_of_a_page_escapes_its_text(text):
+    nasty = text + '<script>alert("x")</script>\'&'
+    html = page.page(
+        nasty, page.section(nasty, page.paragraph(nasty), page.verdict(nasty)),
+        page.warning(nasty), page.listing([nasty]), page.listing([nasty], ordered=False),
+        page.table([nasty], [[nasty]], strong=[0]), page.picture(b'png', nasty),
+        page.details(nasty, page.paragraph(nasty)), footer=nasty)
+    assert '<script' not in html
+    assert html.count('&lt;script&gt;') == 15
+    assert not re.search(r'alt="[^"]*"x"', html)
+
+
+def test_a_new_figure_needs_no_window():
+    figure, axes = new_figure(4, 3, 2, 2)
+    assert axes.shape == (2, 2)
+    assert png(figure, dpi=50).startswith(b'\x89PNG')
