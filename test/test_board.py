@@ -5,6 +5,7 @@
 import math
 import os
 import select
+import socket
 import threading
 import time
 import tty
@@ -149,6 +150,31 @@ def test_drives_the_arm_over_a_real_terminal():
     assert board.status.bad_lines == 0 and board.status.lost_frames == 0
 
 
+def test_speaks_over_the_network(boards):
+    far = BoardOnTerminal()
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        def serve():
+            connection, _ = server.accept()
+            connection.settimeout(0.01)
+            while far.talks:
+                try:
+                    data = connection.recv(4096)
+                except TimeoutError:
+                    data = b''
+                connection.sendall(far(data))
+            connection.close()
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        board = online(boards(f'socket://127.0.0.1:{server.getsockname()[1]}'))
+        board.enable(True)
+        board.set_voltage(3.0)
+        until(lambda: far.board.duty > 0.0, 'the voltage')
+        far.talks = False
+        thread.join()
+        assert 'is lost' in problem(board) or 'takes no bytes' in problem(board)
+
+
 def test_first_word_on_the_way_out_is_zero():
     far = BoardOnTerminal()
     with Terminal(far) as terminal:
@@ -228,6 +254,10 @@ def test_port_that_is_taken(boards):
     with Terminal(BoardOnTerminal()) as terminal:
         online(boards(terminal.port))
         assert 'another program uses it' in problem(boards(terminal.port))
+
+
+def test_device_that_is_to_be_found_by_its_name(boards):
+    assert 'no ports found' in problem(boards('hwgrep://a_board_that_nobody_has'))
 
 
 def test_port_that_is_no_port(boards, tmp_path):

@@ -176,6 +176,22 @@ def test_waiting_read_can_be_ended():
         thread.join()
 
 
+def test_writer_never_waits_for_a_reader_that_is_busy():
+    with open_port('sim://bicep?speed=1000', timeout=0) as port:
+        with port._changed:
+            thread = threading.Thread(target=port.write, args=(b'\n' + encode('enable', 1),))
+            thread.start()
+            thread.join(5.0)
+            assert not thread.is_alive() and not port._cable.board.enabled
+        port.read(1)
+        assert port._cable.board.enabled
+        with port._changed:
+            thread = threading.Thread(target=port.write, args=(encode('disable', 1),))
+            thread.start()
+            thread.join(5.0)
+    assert not port._cable.board.enabled
+
+
 def test_read_waits_no_longer_than_its_timeout():
     with open_port('sim://bicep?silent_after=0', timeout=0.05) as port:
         before = time.monotonic()
@@ -187,9 +203,9 @@ def test_time_follows_the_speed(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
     port = open_port('sim://bicep?speed=50', timeout=0)
-    for _ in range(10):
-        now[0] += 0.1
-        assert port.in_waiting
+    for _ in range(20):
+        now[0] += 0.05
+        assert port.read(10 ** 6)
     assert port._cable.time == pytest.approx(50.0, abs=2 * TICK / 1000.0)
 
 
@@ -200,6 +216,17 @@ def test_host_that_was_held_up_finds_the_arm_waiting(monkeypatch):
     now[0] += 60.0
     assert port.in_waiting
     assert port._cable.time == pytest.approx(protocol_sim.LARGEST_LAG, abs=TICK / 1000.0)
+
+
+def test_arm_does_not_run_ahead_of_a_host_that_reads_slowly(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    port = open_port('sim://bicep?speed=1000', timeout=0)
+    for _ in range(1000):
+        now[0] += 0.01
+        assert port.in_waiting < protocol_sim.LARGEST_BACKLOG + 200
+    waiting = port.in_waiting
+    assert waiting >= protocol_sim.LARGEST_BACKLOG and len(port.read(10 ** 6)) == waiting
 
 
 def test_arm_lives_on_while_the_port_is_closed(monkeypatch):

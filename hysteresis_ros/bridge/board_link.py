@@ -4,6 +4,7 @@
 
 import dataclasses
 import errno
+import os
 import threading
 import time
 
@@ -110,11 +111,14 @@ class BoardLink:
             # pyserial takes a handler that fails to import for one that is not there.
             from hysteresis_ros.bridge.urlhandlers import protocol_sim
             protocol_sim.check_url(port)
+        self._settings = {'baudrate': baud, 'timeout': READ_TIMEOUT,
+                          'write_timeout': timeouts.write, 'exclusive': True}
+        self._serial = None
         try:
-            self._serial = serial.serial_for_url(
-                port, do_not_open=True, baudrate=baud, timeout=READ_TIMEOUT,
-                write_timeout=timeouts.write, exclusive=True)
-        except (ValueError, serial.SerialException) as error:
+            self._make()
+        except serial.SerialException:
+            pass    # hwgrep:// finds nothing yet; open says so
+        except ValueError as error:
             raise ParameterError(f'port {port}: {error}') from None
 
     def open(self):
@@ -128,19 +132,21 @@ class BoardLink:
 
         """
         try:
+            self._make()
             self._serial.open()
-        except OSError as error:
-            reason = _HINTS.get(error.errno) or str(error)
+        except (OSError, ValueError) as error:
+            number = getattr(error, 'errno', None)
+            reason = _HINTS.get(number) or (os.strerror(number) if number else str(error))
+            reason = reason.replace(f'Could not open port {self.port}: ', '')
             raise BoardError(f'port {self.port} cannot be opened: {reason}') from None
-        except ValueError as error:     # what some of pyserial's handlers make of a wrong URL
-            raise BoardError(f'port {self.port} cannot be opened: {error}') from None
         self.decoder.feed(b'\n')
         self._expected = None
 
     def close(self):
         """Close the port, whatever state it is in."""
         try:
-            self._serial.close()
+            if self._serial is not None:
+                self._serial.close()
         except OSError:
             pass    # a device that is gone cannot be closed any better
 
@@ -234,6 +240,10 @@ class BoardLink:
             self._expected = (frame.sequence + 1) % SEQUENCE_LIMIT
         return frames
 
+    def _make(self):
+        if self._serial is None:
+            self._serial = serial.serial_for_url(self.port, do_not_open=True, **self._settings)
+
     def _ask(self, kind, fields, stopping):
         asked = set()
         now = time.monotonic()
@@ -265,6 +275,8 @@ class BoardLink:
         return f'port {self.port}: silent, no answer to {kind!r} {within}; is the board on?'
 
     def _write(self, data):
+        if self._serial is None:
+            raise BoardError(f'port {self.port} is not open')
         try:
             self._serial.write(data)
         except (OSError, TypeError) as error:

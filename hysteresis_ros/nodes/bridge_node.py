@@ -17,6 +17,7 @@ import threading
 import time
 
 from builtin_interfaces.msg import Time
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
@@ -103,7 +104,7 @@ class BridgeNode(Node):
 
     def __init__(self, **options):
         super().__init__('hardware_bridge', **options)
-        self._parameters = parameters = Parameters(
+        self._settings = parameters = Parameters(
             self, self.PARAMETERS, check=_check, changed=self._configure)
         self._board = Board(
             parameters['port'], parameters['baud'], _pwm(parameters), _encoder(parameters),
@@ -129,8 +130,10 @@ class BridgeNode(Node):
         self._diagnostics = Diagnostics(
             self, parameters['hardware_id'], self._values, 'board and arm are fine')
         self.create_subscription(Float64, 'voltage_setpoint', self._on_setpoint, COMMANDS)
-        self.create_service(SetBool, '~/enable', self._on_enable)
-        self.create_service(Trigger, '~/initialise', self._on_initialise)
+        # They wait for the board while all other callbacks go on.
+        waiting = ReentrantCallbackGroup()
+        self.create_service(SetBool, '~/enable', self._on_enable, callback_group=waiting)
+        self.create_service(Trigger, '~/initialise', self._on_initialise, callback_group=waiting)
         self.create_timer(LOOK_PERIOD, self._look, clock=self._wall)
         self._board.enable(self._wanted)
         self._board.start()
@@ -190,7 +193,7 @@ class BridgeNode(Node):
                 return response
             self._outcome = None
             self._progress = 'begun'
-            self._cycle = _cycle(self._parameters)
+            self._cycle = _cycle(self._settings)
         await self._until(lambda status: self._outcome is not None)
         response.success, response.message = self._outcome
         self._diagnostics.clear('setpoint')
@@ -211,7 +214,7 @@ class BridgeNode(Node):
         stamp = self._stamp(sample)
         self._voltages.publish(Float64(data=sample.voltage))
         if sample.fresh:
-            message = JointState(name=[self._parameters['joint_name']], position=[sample.angle],
+            message = JointState(name=[self._settings['joint_name']], position=[sample.angle],
                                  velocity=[sample.velocity])
             message.header.stamp = stamp
             self._joints.publish(message)
@@ -295,13 +298,13 @@ class BridgeNode(Node):
         sample = status.sample
         if not status.online and not status.problem:
             self._diagnostics.set('board', OK, f'looking for the board at '
-                                  f'{self._parameters["port"]}')
+                                  f'{self._settings["port"]}')
         else:
             self._tell('board', ERROR, status.problem)
         self._tell('faults', ERROR, status.faults if status.online else '')
         self._tell('supply', ERROR, status.limit)
         self._tell('timeout', WARN, 'no setpoint for setpoint_timeout '
-                   f'({self._parameters["setpoint_timeout"]:g} s): the output is zero until the '
+                   f'({self._settings["setpoint_timeout"]:g} s): the output is zero until the '
                    'next one' if status.expired else '')
         self._tell('encoder', WARN, f'{sample.encoder_fault} (~/enable ends this warning)'
                    if sample and sample.encoder_fault else '')
@@ -330,7 +333,7 @@ class BridgeNode(Node):
     def _values(self):
         status = self._board.status
         values = {
-            'port': self._parameters['port'], 'online': status.online,
+            'port': self._settings['port'], 'online': status.online,
             'board': status.identity.name if status.identity else 'unknown',
             'connections': status.connections, 'frames': status.frames,
             'bad lines': status.bad_lines, 'lost frames': status.lost_frames,

@@ -4,11 +4,12 @@
 The port ``sim://bicep``: a simulated board on a simulated cable, to pyserial's interface.
 
 The arm lives as long as the port object, also while the port is closed, as a real arm would. Its
-time is the wall's time the chosen speed, taken up whenever somebody opens, reads or writes. A host
-that was itself held up finds the arm waiting: more than `LARGEST_LAG` is not made up for, nor is
-a speed that this machine cannot compute.
+time is the wall's times the chosen speed, taken up whenever somebody opens, reads or writes. A host
+that was itself held up or reads too slowly finds the arm waiting: more than `LARGEST_LAG` is not
+made up for, nor is a speed that this machine cannot compute.
 """
 
+import collections
 import random
 import threading
 import time
@@ -22,7 +23,8 @@ from hysteresis_ros.laboratory.plant import Plant
 
 LARGEST_LAG = 0.25      # s of the wall
 LARGEST_ABSENCE = 10.0  # s of the wall that are made up for when the port is opened
-LONGEST_WORK = 0.05     # s of the wall that one call computes at most
+LONGEST_WORK = 0.01     # s of the wall that one call computes at most
+LARGEST_BACKLOG = 4096  # bytes that wait to be read
 LONGEST_WAIT = 0.02     # s of the wall between two looks at the clock
 
 
@@ -101,6 +103,8 @@ class Cable:
 
     def write(self, data):
         """Take bytes from the host."""
+        if not self._plugged:
+            return
         if not self._lasts('deaf'):
             self.board.receive(self._drop(data, self._to_board))
         self._fetch()
@@ -146,6 +150,7 @@ class Serial(SerialBase):
         self._speed = 1.0
         self._origin = 0.0      # wall time at which the arm's time was, or would have been, 0
         self._ticks = 0
+        self._outbox = collections.deque()      # what the host wrote, on its way to the board
         self._changed = threading.Condition()
         self._cancelled = False
         super().__init__(*args, **kwargs)
@@ -171,6 +176,7 @@ class Serial(SerialBase):
             if not self._cable.plugged:
                 raise SerialException('the cable is unplugged')
             self._cable.received.clear()
+            self._outbox.clear()
             self.is_open = True
 
     def _build(self):
@@ -185,6 +191,8 @@ class Serial(SerialBase):
     def close(self):
         """Close the port. The arm goes on living; the board's watchdog looks after it."""
         with self._changed:
+            if self.is_open:
+                self._deliver()
             self.is_open = False
             self._changed.notify_all()
 
@@ -224,10 +232,17 @@ class Serial(SerialBase):
 
         """
         data = to_bytes(data)
-        with self._changed:
-            self._live()
-            self._cable.write(data)
-            self._changed.notify_all()
+        if not self.is_open:
+            raise PortNotOpenError()
+        self._outbox.append(data)
+        # A reader that is busy with the arm delivers it at the arm's next tick; waiting for its
+        # lock could take for ever on a machine that cannot keep up with the speed.
+        if self._changed.acquire(blocking=False):
+            try:
+                self._live()
+                self._changed.notify_all()
+            finally:
+                self._changed.release()
         return len(data)
 
     def cancel_read(self):
@@ -264,8 +279,13 @@ class Serial(SerialBase):
         if not self.is_open:
             raise PortNotOpenError()
         self._catch_up(LARGEST_LAG, LONGEST_WORK)
+        self._deliver()
         if not self._cable.plugged:
             raise SerialException('the cable was unplugged')
+
+    def _deliver(self):
+        while self._outbox:
+            self._cable.write(self._outbox.popleft())
 
     def _catch_up(self, largest_lag, longest_work):
         now = time.monotonic()
@@ -275,7 +295,8 @@ class Serial(SerialBase):
         if excess > 0:
             self._origin += excess / rate
             due -= excess
-        while due > 0:
+        while due > 0 and len(self._cable.received) < LARGEST_BACKLOG:
+            self._deliver()
             self._cable.tick()
             self._ticks += 1
             due -= 1
