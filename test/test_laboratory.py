@@ -75,6 +75,7 @@ def test_grain_temperatures_are_asymmetric_and_deterministic():
     """The hot tail is longer than the cold foot, and cooling comes after heating."""
     heating, cooling = GrainDistribution().temperatures(2000, 0.3)
     low, middle, high = np.quantile(heating, [0.02, 0.5, 0.98])
+    assert heating[0] < 27.5 and np.all(np.diff(heating) > 0.0)
     assert high - middle > 1.5 * (middle - low)
     assert np.all(heating > cooling)
     again = GrainDistribution().temperatures(2000, 0.3)
@@ -315,6 +316,15 @@ def test_linkage_is_the_papers():
     sine_delta = clamp[0] / z
     assert linkage.moment_arm(theta) == pytest.approx(y * sine_delta, rel=1e-12)
     assert 0.013 < linkage.moment_arm(theta) < 0.0185
+
+
+def test_weights_of_clamp_and_tilted_frame():
+    """The clamp's moment is that at its own direction; a frame that leans adds its angle."""
+    theta, plain = 2.0, Linkage()
+    clamp = Linkage(clamp_mass=0.02, clamp_radius=0.05, clamp_phase=0.4)
+    assert clamp.moment(theta) - plain.moment(theta) == pytest.approx(
+        0.02 * 9.81 * 0.05 * math.sin(2.4))
+    assert Linkage(tilt=0.2).moment(theta) == pytest.approx(plain.moment(2.2))
 
 
 def test_heavier_and_lower():

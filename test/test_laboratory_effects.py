@@ -11,8 +11,10 @@ from hysteresis_ros.laboratory.conditions import Air, Conditions
 from hysteresis_ros.laboratory.effects import apply_effects
 from hysteresis_ros.laboratory.heat import GAIN, HeatBalance
 from hysteresis_ros.laboratory.linkage import Linkage
+from hysteresis_ros.laboratory.muscle import Muscle
 from hysteresis_ros.laboratory.plant import BRISK
 from hysteresis_ros.laboratory.sequences import repeated_loop, steps_of_all_speeds
+from hysteresis_ros.laboratory.unlisted import Events
 import numpy as np
 import pytest
 
@@ -207,6 +209,16 @@ def test_creep_follows_the_logarithm_of_time():
     assert up[-1] > up[100] + 0.015
 
 
+def test_creep_of_a_full_transformation():
+    """After 57 s it is the share c of the length times ln(1 + 57 / 3), as the wires contract."""
+    conditions = Conditions(creep=0.004, creep_time=3.0)
+    muscle = Muscle(conditions)
+    muscle.age(6.0, 0.1)
+    muscle.commit(120.0, [3.0])
+    muscle.age(6.0, 57.0)
+    assert muscle.wires[0].excess == pytest.approx(-0.004 * 0.27 * math.log(20.0), rel=1e-3)
+
+
 def test_fatigue_counts_cycles():
     """Repeated loops drift; without cycles nothing does."""
     arm = calm(shrinkage=0.0025, tiring=0.02)
@@ -320,6 +332,45 @@ def test_latency_delays_the_reading():
     arm = calm(latency=1.0)
     arm.settle(30.0, 4.3)
     assert arm.measured_angle == arm.angle
+
+
+def disturbance(name):
+    """Return the strong disturbance of an arm with one unlisted effect."""
+    return apply_effects(Conditions(), {name: 1.0}, 0).disturbances[0]
+
+
+def test_cable_pulls_the_raised_arm_down():
+    """Not at all below some angle, and more and more above it."""
+    cable = disturbance('unlisted_stiffening_cable')
+    moments = [cable.moment(0.0, math.radians(angle)) for angle in (135.0, 115.0, 105.0, 95.0)]
+    assert moments[0] == 0.0 < moments[1] < moments[2] < moments[3]
+    assert moments[3] - moments[2] > moments[2] - moments[1]
+
+
+def test_magnet_holds_the_arm():
+    """It pulls from either side to one angle."""
+    magnet = disturbance('unlisted_magnet')
+    assert magnet.moment(0.0, math.radians(108.0)) > 0.01
+    assert magnet.moment(0.0, math.radians(126.0)) < -0.01
+
+
+def test_places_that_heat_or_cut_the_wires_off():
+    """A hot surface warms at its angle; a flexed lead gives less to the raised arm."""
+    hot, lead = disturbance('unlisted_hot_surface'), disturbance('unlisted_flexed_lead')
+    warmth = [hot.warmth(0.0, math.radians(angle)) for angle in (95.0, 117.0, 140.0)]
+    assert warmth[1] > 10.0 > 1.0 > max(warmth[0], warmth[2]) >= 0.0
+    contact = [lead.contact(0.0, math.radians(angle)) for angle in (95.0, 140.0)]
+    assert 0.75 < contact[0] < 0.9 < 0.99 < contact[1] <= 1.0
+
+
+def test_events_come_as_often_as_asked():
+    """About twelve jumps in a recording, none before it began."""
+    counts = [Events(12.0, 900.0, np.random.default_rng(seed)).passed(900.0)
+              for seed in range(60)]
+    assert np.mean(counts) == pytest.approx(12.0, abs=1.0)
+    events = Events(3.0, 900.0, np.random.default_rng(1))
+    assert events.since(0.0) == math.inf
+    assert events.since(events.times[1] + 2.0) == pytest.approx(2.0)
 
 
 @pytest.fixture(scope='module')

@@ -92,8 +92,3 @@ class Linkage:
         return self._weight * math.sin(theta + self.tilt) + (
             self.clamp_mass * self.gravity * self.clamp_radius
             * math.sin(theta + self.clamp_phase + self.tilt))
-
-    @property
-    def inertia(self) -> float:
-        """Moment of inertia of payload and forearm about the pivot [kg m^2]."""
-        return self.forearm_length ** 2 * (self.payload_mass + self.forearm_mass / 3.0)

@@ -26,7 +26,6 @@ from hysteresis_ros.laboratory.bench import Bench, HOLD
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.effects import apply_effects
 from hysteresis_ros.laboratory.heat import HeatBalance
-from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.wire import WireMaterial
 
 # Time constants of Eq. 1 [s]: in the paper, and in continuous recordings.
@@ -104,11 +103,6 @@ class Plant:
         self.bench = Bench(bench, seed=[seed, recording, 11])
         self.arm = Arm(conditions, seed=[seed, recording, 12])
         self._chance = np.random.default_rng([seed, recording, 13])
-
-    @property
-    def geometry(self) -> dict:
-        """What the arm's data sheet says: the keys of a geometry file."""
-        return dict(GEOMETRY)
 
     def force_trial(self, voltages) -> np.ndarray:
         """Return the settled forces [N] of the wire at its resting length, from the cold state."""
