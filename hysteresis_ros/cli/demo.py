@@ -1,0 +1,241 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`hysteresis demo`: the whole system on the simulated arm, from the bench to the comparison."""
+
+import argparse
+from pathlib import Path
+import shutil
+
+import numpy as np
+
+from hysteresis_ros.cli.common import add_json, progress, say, write_json
+from hysteresis_ros.errors import ParameterError
+
+HOLD = 30.0
+VALUES = 40
+
+
+def add_parser(subparsers):
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        'demo', help='the whole system on the simulated arm',
+        description='Identifies the simulated bench, drives the simulated arm with the three nodes '
+        'as processes through a sinusoidal and a random sequence of target angles, records a '
+        'rosbag2 bag, reads it back, and compares: the rows of Table I for the arm. With --hidden '
+        'a physical effect is hidden in the arm, found, added to the model, and the arm driven '
+        'again.')
+    parser.add_argument('-o', '--output', default='demo', metavar='DIR',
+                        help='folder for everything that is written (default: demo)')
+    parser.add_argument('--seed', type=int, default=1, metavar='S', help='of arm and sequences')
+    parser.add_argument('--speed', type=float, default=60.0, metavar='X',
+                        help="the arm's time against the wall clock's (default: 60)")
+    parser.add_argument('--values', type=int, default=VALUES, metavar='N',
+                        help='targets in each sequence (default: 40)')
+    parser.add_argument('--effects', choices=('none', 'auto'), default='none',
+                        help="none: the paper's model (default); auto: with what the bench proves")
+    parser.add_argument('--hidden', metavar='EFFECT', nargs='?', const='random',
+                        help='hide an effect in the arm; without a name one is drawn by the seed '
+                        'and told at the end')
+    parser.add_argument('--strength', type=float, default=1.0, help=argparse.SUPPRESS)
+    add_json(parser)
+    return parser
+
+
+# Effects whose inverse makes the arm better in settled steps, for a draw.
+DRAWN = ('payload_error', 'supply_sag', 'encoder_offset', 'coulomb_friction', 'frame_tilt',
+         'airflow', 'backlash')
+
+
+def run(args):
+    """Do it."""
+    from hysteresis_ros.diagnosis.compare import compare
+    from hysteresis_ros.measurements import read_measurement, settled_rows
+
+    if args.values < 4:
+        raise ParameterError('--values must be at least 4')
+    if not 0.1 <= args.speed <= 200.0:
+        raise ParameterError('--speed must be from 0.1 to 200')
+    folder = Path(args.output)
+    if folder.exists() and not (folder / 'model.yaml').exists() and any(folder.iterdir()):
+        raise ParameterError(f'{folder}: not empty and not a demo; name another folder with -o')
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    model = bench_model(args, folder)
+    hidden = drawn(args)
+    sequences = target_sequences(model, args)
+    result = {'runs': []}
+    runs = drive(args, folder / 'run', sequences, folder / 'model.yaml', hidden)
+    result['runs'].append(summary('the identified model', sequences, runs))
+    linear = linear_runs(args, model, sequences, hidden)
+    result['linear'] = summary('the linear model', sequences, linear)
+    say(args, table(result))
+    bag = read_measurement(folder / 'run')
+    comparison = compare(model, [settled_rows(bag) or bag])
+    say(args, '\n' + comparison.to_text())
+    again = None
+    if hidden:
+        again = find_and_extend(args, folder, model, sequences, bag, hidden, result)
+    draw(folder / 'demo.png', sequences, runs, linear, again)
+    say(args, f'\nPicture: {folder / "demo.png"}; recording: {folder / "run"} (rosbag2, mcap)')
+    if args.json:
+        write_json(args.json, result)
+
+
+def bench_model(args, folder):
+    """Identify the simulated bench and save the model."""
+    from hysteresis_ros.bicep import BicepGeometry
+    from hysteresis_ros.identification.bench import identify
+    from hysteresis_ros.identification.effects import add_effects
+    from hysteresis_ros.laboratory.protocols import write_protocol
+    from hysteresis_ros.measurements import read_measurement
+
+    write_protocol('bench', folder / 'bench', {}, args.seed)
+    force, length = (read_measurement(folder / 'bench' / name)
+                     for name in ('force.csv', 'length.csv'))
+    model = identify(length, force, force_trials=[0], length_trials=range(4),
+                     geometry=BicepGeometry.from_yaml(folder / 'bench' / 'geometry.yaml')).model
+    if args.effects == 'auto':
+        model, _ = add_effects(model, length, force, length_trials=range(4), force_trials=[0],
+                               jobs=-1)
+    model.save(folder / 'model.yaml')
+    say(args, 'Bench identified: ' + ', '.join(
+        f'{name} {part} {values[part]["model"]["mean_percent"]:.2f} %'
+        for name, values in model.metrics.items() for part in values))
+    return model
+
+
+def drawn(args):
+    """Return the effect to hide, or None."""
+    if args.hidden != 'random':
+        return args.hidden
+    return str(np.random.default_rng([args.seed, 77]).choice(DRAWN))
+
+
+def target_sequences(model, args):
+    """Return the sinusoidal and the random sequence [rad], inside what the muscle reaches."""
+    from hysteresis_ros.measurements.table import Measurement
+
+    limits = np.array([0.0, model.ranges['voltage'][1]])
+    ends = model.predict(Measurement.from_columns(
+        {'time': [30.0, 60.0], 'trial': [0.0, 0.0], 'voltage': limits, 'angle': [0.0, 0.0]}))
+    margin = 0.06 * np.ptp(ends)
+    low, high = ends.min() + margin, ends.max() - margin
+    phase = 2.0 * np.pi * np.arange(args.values) / args.values * 2.0
+    sinusoid = 0.5 * (low + high) + 0.5 * (high - low) * np.cos(phase)
+    chance = np.random.default_rng([args.seed, 78])
+    return {'sinusoidal': sinusoid, 'random': chance.uniform(low, high, args.values)}
+
+
+def drive(args, folder, sequences, model_file, hidden):
+    """Drive the arm with the three nodes and return the angles reached, by sequence."""
+    try:
+        from hysteresis_ros.nodes.session import record
+    except ImportError as error:
+        raise ParameterError(f'the demo needs ROS 2: {error}; run it with `make demo`') from None
+
+    port = f'sim://bicep?speed={args.speed:g}&seed={args.seed}'
+    if hidden:
+        port += f'&{hidden}={args.strength:g}'
+    parameters = {
+        'port': port, 'model_file': str(Path(model_file).resolve()), 'use_sim_time': True,
+        'telemetry_rate': 2.0, 'republish_period': 5.0, 'setpoint_timeout': 60.0,
+        'telemetry_timeout': 30.0, 'board_watchdog': 30.0}
+    steps = iter(progress(range(len(sequences) * args.values), 'driving',
+                          len(sequences) * args.values))
+    reached = record(folder, list(sequences.values()), parameters, HOLD,
+                     lambda: next(steps, None))
+    return dict(zip(sequences, reached))
+
+
+def linear_runs(args, model, sequences, hidden):
+    """Apply the linear model's voltages to the same simulated arm, without nodes."""
+    from hysteresis_ros.laboratory.plant import Plant
+
+    geometry = model.require_geometry()
+    low, high = model.ranges['voltage']
+    reached = {}
+    for name, targets in sequences.items():
+        voltages = np.clip(model.linear.drive_for_length(
+            geometry.length(targets), geometry.force(targets)), low, high)
+        plant = Plant(args.seed, {hidden: args.strength} if hidden else {})
+        reached[name] = plant.arm_trial(voltages)['angle']
+    return reached
+
+
+def summary(name, sequences, runs):
+    """Errors of one way of driving [deg]: Eqs. 23 and 24 without the division by the range."""
+    rows = {}
+    for sequence, targets in sequences.items():
+        error = np.degrees(runs[sequence] - targets)
+        rows[sequence] = {'mean_deg': float(np.mean(np.abs(error))),
+                          'std_deg': float(np.std(error))}
+    return {'driven_by': name, **rows}
+
+
+PAPER = {'sinusoidal': (1.8, 0.8, 3.4, 1.7), 'random': (1.6, 1.1, 4.2, 2.9)}
+
+
+def table(result):
+    """Return Table I's rows for the arm."""
+    from hysteresis_ros.diagnosis.compare import layout
+
+    rows = [['arm [deg]', 'mean, model', 'std', 'mean, linear', 'std', 'paper: mean', 'std',
+             'linear', 'std']]
+    for name, paper in PAPER.items():
+        ours, linear = result['runs'][-1][name], result['linear'][name]
+        rows.append([name, *(f'{value:.2f}' for value in (
+            ours['mean_deg'], ours['std_deg'], linear['mean_deg'], linear['std_deg'])),
+            *(f'{value:.1f}' for value in paper)])
+    return '\n'.join(layout(rows))
+
+
+def find_and_extend(args, folder, model, sequences, bag, hidden, result):
+    """Diagnose the recording, extend the model, drive again; return the angles reached then."""
+    from hysteresis_ros.cli.diagnose import to_text
+    from hysteresis_ros.diagnosis.diagnose import diagnose
+    from hysteresis_ros.diagnosis.extend import extend
+    from hysteresis_ros.measurements import settled_rows
+
+    data = [settled_rows(bag) or bag]
+    found = diagnose(model, data, jobs=-1,
+                     progress=lambda items, total: progress(items, 'effects', total))
+    say(args, '\n' + to_text(found, 'angle'))
+    again = None
+    result['found'] = found.missing
+    if found.missing:
+        extension = extend(model, found.missing, data)
+        extension.model.save(folder / 'extended.yaml')
+        again = drive(args, folder / 'run_extended', sequences, folder / 'extended.yaml', hidden)
+        result['runs'].append(summary('the extended model', sequences, again))
+        say(args, '\nDriven again with the extended model:\n' + table(result))
+    result['hidden'] = hidden
+    say(args, f'\nHidden was: {hidden}')
+    return again
+
+
+def draw(path, sequences, runs, linear, again):
+    """Save the picture: targets and angles reached, and the errors."""
+    from hysteresis_ros.diagnosis.plots import new_figure, png
+
+    made = new_figure(10.0, 5.6, 2, len(sequences), sharex='col')
+    figure, axes = made[0], np.asarray(made[1]).reshape(2, -1)
+    styles = [('linear model', linear, '#b0b0b0', '-'), ('identified model', runs, '#1f77b4', '-')]
+    if again is not None:
+        styles.append(('extended model', again, '#2ca02c', '-'))
+    for column, (name, targets) in enumerate(sequences.items()):
+        index = np.arange(1, len(targets) + 1)
+        upper, lower = axes[:, column]
+        upper.step(index, np.degrees(targets), where='mid', color='black', lw=1.2, label='target')
+        for label, angles, colour, line in styles:
+            reached = angles[name]
+            upper.plot(index, np.degrees(reached), line, marker='o', ms=3, lw=0.8, color=colour,
+                       label=label)
+            lower.plot(index, np.degrees(reached - targets), line, marker='o', ms=3, lw=0.8,
+                       color=colour)
+        lower.axhline(0.0, color='black', lw=0.8)
+        upper.set_title(f'{name} sequence, {len(targets)} values held for {HOLD:g} s')
+        lower.set_xlabel('index')
+    axes[0, 0].set_ylabel('angle [deg]')
+    axes[1, 0].set_ylabel('error [deg]')
+    axes[0, 0].legend(loc='best', fontsize=8)
+    Path(path).write_bytes(png(figure))
