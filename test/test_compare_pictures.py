@@ -5,6 +5,7 @@
 import base64
 import io
 import re
+from types import SimpleNamespace
 
 from hypothesis import given, strategies
 from hysteresis_ros.diagnosis import page
@@ -56,6 +57,16 @@ def test_a_bench_table_has_its_plane(comparison):
     assert 'plane' in drawn and 'since_step' not in drawn
     assert drawn['plane'].axes[0].get_ylabel() == 'force [N]'
     assert png(drawn['overlay']).startswith(b'\x89PNG')
+
+
+def test_the_waterfall_shows_every_step_of_an_extension(comparison):
+    model = FakeModel(effects=[SimpleNamespace(id='payload_error', offset=0.01)])
+    drawn = figures(compare(model, [run(lambda t, v, up: 0.03)]))['waterfall']
+    axis = drawn.axes[0]
+    assert [text.get_text() for text in axis.get_yticklabels()] == ['two-stage', '+ payload_error']
+    widths = [bar.get_width() for bar in axis.patches]
+    np.testing.assert_allclose(widths, np.rad2deg([0.03, 0.02]), rtol=1e-3)
+    assert axis.get_xlabel() == 'RMSE of the angle [deg]'
 
 
 def test_a_single_row_is_drawn():

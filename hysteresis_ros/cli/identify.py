@@ -29,6 +29,8 @@ def add_parser(subparsers):
     parser.add_argument('--effects', default='none', metavar='none|auto|A,B',
                         help="effects of the catalogue to add: none (default, the paper's model), "
                         'those that the tables prove (auto), or those named')
+    parser.add_argument('--anchored', action='store_true',
+                        help='tie H1(0) to the pretension and H2(0) to zero')
     parser.add_argument('-o', '--output', required=True, metavar='MODEL.yaml')
     add_json(parser)
     return parser
@@ -49,7 +51,7 @@ def run(args):
     steps('identifying')
     found = identify(length, force, force_trials=args.force_trials,
                      length_trials=args.length_trials, geometry=geometry, levels=args.levels,
-                     operator=args.operator)
+                     operator=args.operator, anchored=args.anchored)
     steps.clear()
     model, added = found.model, []
     if args.effects != 'none':
@@ -102,7 +104,8 @@ def report(model, found, added):
                 '-' if cell is None else f'{cell:.2f} %' for cell in cells), str(values['rows'])])
     lines = layout(rows)
     for name, fit in (('H1', found.force_fit), ('H2', found.length_fit)):
-        if fit is not None:
+        # With effects H2 was fitted once more; what its first fit said no longer holds.
+        if fit is not None and not (added and name == 'H2'):
             lines.append(f'{name}: {len(fit.weights)} weights, rank {fit.rank}, '
                          f'{len(fit.never_excited)} cells never excited, bias {fit.bias:.4g}')
     for effect in added:

@@ -11,6 +11,7 @@ from hysteresis_ros.measurements.quantities import shown
 CAPTIONS = {
     'overlay': 'Measured and predicted response, and below what is left; the grey band is the '
                'noise floor.',
+    'waterfall': 'How the error falls with every effect that was added, down to the noise.',
     'signals': 'What is left against every signal: rows, and means with their 95 % intervals.',
     'loop': 'The loop of drive and response, and where on it the model fails.',
     'plane': 'What is left over drive and load.',
@@ -45,11 +46,11 @@ def comparison_page(comparison, pictures, model_path):
     parts = [page.verdict(summary(comparison)),
              *[page.warning(note) for note in comparison.warnings],
              page.section('Errors', page.table(header, rows, strong))]
-    if 'overlay' in pictures:
-        parts.append(page.picture(pictures['overlay'], CAPTIONS['overlay']))
+    parts += [page.picture(pictures[name], CAPTIONS[name]) for name in ('waterfall', 'overlay')
+              if name in pictures]
     parts.append(page.section('Where it fails', where, *[
         page.picture(data, CAPTIONS.get(name, name)) for name, data in pictures.items()
-        if name not in ('overlay', 'correlogram', 'coverage')]))
+        if name not in ('waterfall', 'overlay', 'correlogram', 'coverage')]))
     parts.append(page.section('Trials', *trials(comparison)))
     parts.append(page.section('Recording', *[
         page.picture(pictures[name], CAPTIONS[name]) for name in ('coverage', 'correlogram')

@@ -36,12 +36,16 @@ def figures(comparison):
     Returns
     -------
     dict of str to matplotlib.figure.Figure
-        By file name without suffix: `overlay`, `signals`, `loop`, and where the
-        recording has what they need `plane`, `since_step`, `correlogram`, `coverage`.
+        By file name without suffix: `overlay`, `signals`, `loop`, and where
+        there is what they need `waterfall`, `plane`, `since_step`, `correlogram`, `coverage`.
 
     """
     drawn = {'overlay': overlay(comparison), 'signals': residual_against_signals(comparison),
              'loop': residual_on_loop(comparison)}
+    if comparison.extensions:
+        drawn['waterfall'] = waterfall([(name, values.rmse) for name, values
+                                        in comparison.extensions],
+                                       comparison.floor.value, comparison.quantity)
     drive, load = comparison.drive, load_of(comparison)
     if load is not None:
         drawn['plane'] = residual_on_plane(comparison, drive, load)
@@ -294,6 +298,43 @@ def load_of(comparison):
     """Return the name of the load that varies, or None."""
     return next((name for name in ('force', 'stress') if name in comparison.signals
                  and name != comparison.drive), None)
+
+
+def waterfall(steps, floor, quantity):
+    """
+    Draw how the error falls with every effect that was added.
+
+    Parameters
+    ----------
+    steps : list of (str, float)
+        What the model had and its RMSE, in the unit of files; the first without the effects.
+    floor : float
+        RMSE that the noise leaves.
+    quantity : str
+        The response.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    figure, axes = new_figure(6.5, 0.9 + 0.45 * len(steps))
+    axis = axes[0, 0]
+    names = [name for name, _ in steps]
+    values = scaled(quantity, np.array([value for _, value in steps]))
+    axis.barh(range(len(steps)), values, height=0.6, edgecolor='#12355b', linewidth=0.8,
+              color=['#12355b', *['#9db7d3'] * (len(steps) - 1)])
+    for row, value in enumerate(values):
+        axis.annotate(f'{value:.3g}', (value, row), (4, 0), textcoords='offset points',
+                      va='center', fontsize=8)
+    axis.axvline(scaled(quantity, floor), color='black', linewidth=1.0, linestyle=':')
+    axis.annotate('noise', (scaled(quantity, floor), -0.5), (3, 0), textcoords='offset points',
+                  fontsize=7, va='bottom')
+    axis.set_yticks(range(len(steps)), names)
+    axis.set_ylim(len(steps) - 0.4, -0.7)
+    axis.set_xlim(0, 1.12 * max(float(values.max()), 1e-12))
+    axis.set_xlabel(f'RMSE of the {label(quantity)[0]} [{label(quantity)[1] or "1"}]')
+    return figure
 
 
 def residual_on_plane(comparison, drive, load):

@@ -18,7 +18,7 @@ from scipy.stats import t as student
 MOST_BINS = 12
 FEWEST_ROWS = 4
 FEWEST_BLOCKS = 12
-LEAST_SHARE = 0.03
+LEAST_SHARE = 0.05
 MOST_REGIONS = 8
 CONFIDENCE = 0.95
 
