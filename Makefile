@@ -88,7 +88,9 @@ demo: build
 	@$(IN_WORKSPACE) $(PREFIX)/lib/hysteresis_ros/hysteresis demo $(DEMO_ARGS)
 
 test: build
-	@$(IN_WORKSPACE) $(VENV)/bin/python -m pytest --cov --cov-report=term $(PYTEST_ARGS)
+	@$(IN_WORKSPACE) COVERAGE_CORE=sysmon COVERAGE_FILE=$(WORKSPACE)/build/coverage \
+		$(VENV)/bin/python -m pytest -o cache_dir=$(WORKSPACE)/build/pytest_cache \
+		--cov --cov-report=term $(PYTEST_ARGS)
 
 benchmark: build
 	@$(IN_WORKSPACE) $(VENV)/bin/python -m benchmark benchmark.json
