@@ -16,6 +16,7 @@ from std_srvs.srv import Trigger
 
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.nodes import compensator_node
 from hysteresis_ros.nodes.compensator_node import CompensatorNode
 from hysteresis_ros.nodes.feedback import AngleFeedback
 from hysteresis_ros.nodes.reference import ArmReference
@@ -188,14 +189,45 @@ def test_wrong_reference_is_not_followed(graph, wrong, words):
     assert int(values['references received']) == 1 + int(values['setpoints published']) + 1
 
 
-def test_overdriving_needs_repeats():
-    """The horizon is served by the repeats, so they must be on."""
+def test_small_reversals_are_not_followed(graph):
+    """The dead band reaches the inverse, which amplifies noise right after a reversal."""
+    muscle = Muscle(graph, dead_band=1e-3)
+    angles = [1.6, 1.9, 1.899, 1.9, 1.898]
+    muscle.ask(*angles)
+    controller = small_model().controller(voltage_limits=(0.0, 6.0), dead_band=1e-3)
+    expected = [controller.setpoint(*GEOMETRY_OF_TESTS.reference(angle)).voltage
+                for angle in angles]
+    assert muscle.wait(5) == pytest.approx(expected, abs=1e-12)
+    assert expected != pytest.approx(offline(angles), abs=1e-6)
+
+
+def test_lagging_muscle_is_overdriven_until_it_is_warm(graph):
+    """The first voltage is too high, and the repeats come down to the one that holds."""
+    lag = catalogue()['thermal_lag'](small_model().surroundings, time_constant=0.5)
+    model = small_model([lag])
+    muscle = Muscle(graph, model, horizon=0.25, republish_period=0.05)
+    muscle.ask(1.75)
+    steady = offline([1.75], model=model)[0]
+    assert muscle.wait(1)[0] > steady + 0.1
+    graph.until(lambda: abs(muscle.voltages[-1] - steady) < 0.02, 'the steady voltage')
+
+
+def test_without_repeats_nothing_is_overdriven(graph):
+    """Nobody would bring the voltage down again."""
+    lag = catalogue()['thermal_lag'](small_model().surroundings, time_constant=0.5)
+    model = small_model([lag])
+    muscle = Muscle(graph, model, horizon=0.25, republish_period=0.0)
+    muscle.ask(1.75)
+    assert muscle.wait(1) == pytest.approx(offline([1.75], model=model), abs=1e-12)
+
+
+def test_repeats_come_within_the_horizon():
+    """A cross check of two parameters."""
     values = {spec.name: spec.default for spec in CompensatorNode.PARAMETERS}
-    from hysteresis_ros.nodes import compensator_node
-    compensator_node._check({**values, 'horizon': 0.5})
-    for horizon, period in ((1.0, 0.0), (0.4, 0.5)):
-        with pytest.raises(ParameterError, match='republish_period'):
-            compensator_node._check({**values, 'horizon': horizon, 'republish_period': period})
+    for horizon in (0.0, 0.5, 5.0):
+        compensator_node._check({**values, 'horizon': horizon, 'republish_period': 0.5})
+    with pytest.raises(ParameterError, match='republish_period 0.5 s is longer than the horizon'):
+        compensator_node._check({**values, 'horizon': 0.4, 'republish_period': 0.5})
 
 
 class Arm:

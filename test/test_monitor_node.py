@@ -69,6 +69,18 @@ def test_prediction_and_residual(graph):
     assert monitor.predictions[0].name == ['elbow']
 
 
+def test_time_runs_from_the_first_sample(graph):
+    """An effect of the time since the start does not see the seconds since 1970."""
+    drift = catalogue()['ambient_drift'](small_model().surroundings, rate=10.0)
+    model = small_model([drift])
+    monitor, observer = Monitor(graph, model), model.observer()
+    expected = [observer.step(time, 3.0) for time in (0.0, 60.0)]
+    for second in (1_700_000_000, 1_700_000_060):
+        monitor.measure(second, 3.0, 1.7)
+    assert monitor.wait(2) == pytest.approx(expected, abs=1e-12)
+    assert expected[1] < expected[0]
+
+
 def test_nothing_is_predicted_without_voltage_or_angle(graph):
     """Neither NaN nor another joint nor a missing voltage makes a prediction."""
     monitor = Monitor(graph)

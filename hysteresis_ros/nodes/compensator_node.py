@@ -36,8 +36,9 @@ COMPENSATION = (
          's', 0.0, 60.0),
     Spec('dead_band', 0.0, 'Reversals of the reference length up to this are not followed, '
          'because the inverse amplifies their noise', 'm', 0.0, 0.01),
-    Spec('horizon', 0.0, 'Time in which a lagging muscle is to reach its temperature, overdriven '
-         'within the limits; 0 for never overdriven', 's', 0.0, 600.0),
+    Spec('horizon', 5.0, 'Time in which a muscle that the model knows to lag is to reach its '
+         'temperature; it is overdriven meanwhile, within the limits. 0 for never overdriven, as '
+         'without republish_period', 's', 0.0, 600.0),
     Spec('feedback', False, 'Whether the measured angle corrects the setpoint slowly',
          read_only=True),
     Spec('feedback_gain', 0.1, 'Correction rate of the target angle per error', '1/s', 0.0, 10.0),
@@ -96,13 +97,15 @@ class CompensatorNode(Node):
         self._arm = ArmReference(self._geometry, self._model)
         self._controller.limits = parameters['minimum_voltage'], parameters['maximum_voltage']
         self._controller.dead_band = parameters['dead_band']
-        self._controller.horizon = parameters['horizon'] or math.inf
+        # Whoever overdrives has to come back: that is done by the repeats.
+        repeated = parameters['republish_period'] > 0.0
+        self._controller.horizon = (parameters['horizon'] if repeated else 0.0) or math.inf
         self._integral.configure(*(parameters[f'feedback_{name}'] for name in (
             'gain', 'limit', 'rest_speed', 'dead_band', 'period')))
         if self._timer is not None:
             self.destroy_timer(self._timer)
             self._timer = None
-        if parameters['republish_period'] > 0.0:
+        if repeated:
             self._timer = self.create_timer(parameters['republish_period'], self._repeat)
 
     def _forget(self):
@@ -205,9 +208,9 @@ def _check(values):
     check_limits(values, 'voltage')
     BicepGeometry.from_mapping(values)
     horizon, period = values['horizon'], values['republish_period']
-    if horizon > 0.0 and not 0.0 < period <= horizon:
-        raise ParameterError(f'horizon {horizon:g} s needs a republish_period above 0 and not '
-                             f'above the horizon, not {period:g} s')
+    if 0.0 < horizon < period:
+        raise ParameterError(f'republish_period {period:g} s is longer than the horizon of '
+                             f'{horizon:g} s; a muscle would be overdriven for too long')
 
 
 def main(args=None) -> int:
