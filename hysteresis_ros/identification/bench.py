@@ -13,15 +13,16 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import optimize
 
 from hysteresis_ros import __version__
 from hysteresis_ros.diagnosis.metrics import errors
+from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.identification.baselines import fit_linear
+from hysteresis_ros.identification.first_stage import first_stage_from_lengths
 from hysteresis_ros.identification.least_squares import WeightFit
 from hysteresis_ros.identification.operators import fit_operator
-from hysteresis_ros.model import LinearModel, MuscleModel
-from hysteresis_ros.operators import Linear
+from hysteresis_ros.model import MuscleModel
 
 LEVELS = (10, 20)
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
@@ -44,6 +45,31 @@ class Identified:
     model: MuscleModel
     force_fit: WeightFit | None
     length_fit: WeightFit | None
+
+
+@dataclasses.dataclass(frozen=True)
+class Recipe:
+    """
+    How each stage is fitted.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of operator, see `fit_operator`.
+    anchored : bool
+        Whether the known cold state is met exactly.
+    options : dict
+        Further options of `fit_operator`.
+    """
+
+    kind: str
+    anchored: bool
+    options: dict
+
+    def fit(self, parts, target, groups, levels, anchor):
+        """Return operator and fit; the parameters are those of `fit_operator`."""
+        return fit_operator(self.kind, parts, target, groups, levels,
+                            anchor=anchor if self.anchored else None, **self.options)
 
 
 def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray:
@@ -69,7 +95,7 @@ def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray
 
 def identify(length=None, force=None, *, force_trials=None, length_trials=None, geometry=None,
              levels: Sequence[int] = LEVELS, operator: str | None = None,
-             anchored: bool = False) -> Identified:
+             anchored: bool = False, plain: bool = False) -> Identified:
     """
     Identify the muscle from bench tables.
 
@@ -90,6 +116,8 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
         the others are the two-stage cascade made of such operators.
     anchored : bool
         Whether H1(0) is tied to the first force of the cold muscle and H2(0) to zero.
+    plain : bool
+        Whether to identify as the paper does: weights of the cells only, without regularisation.
 
     Returns
     -------
@@ -114,6 +142,7 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
         raise IdentificationError(f'levels must be positive, not {levels}')
     kind = 'preisach' if operator in ('two-stage', 'preisach') else operator
     some = length if length is not None else force
+    recipe = Recipe(kind, anchored, {'strength': 0.0, 'reversible': False} if plain else {})
     model = MuscleModel(
         'preisach' if operator == 'preisach' else 'two-stage', some.drive,
         length.load if loaded else None, length.response if length is not None else 'force',
@@ -122,16 +151,18 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     force_fit = length_fit = None
     if force is not None:
         rows = choose_trials(force, force_trials, 'force')
-        model.force_stage, force_fit = _force_stage(model, force, rows, levels[0], kind, anchored)
+        model.force_stage, force_fit = _force_stage(model, force, rows, levels[0], recipe)
     if length is not None:
         rows = choose_trials(length, length_trials, 'length')
         if operator == 'preisach' or not loaded:
-            length_fit = _drive_stage(model, length, rows, levels[1], kind)
+            length_fit = _drive_stage(model, length, rows, levels[1], recipe)
         else:
             if model.force_stage is None:
-                model.force_stage = _first_stage_from_lengths(model, length, rows, levels)
-            length_fit = _length_stage(model, length, rows, levels[1], kind, anchored)
-    model.linear = _linear(model, force, force_trials, length, length_trials)
+                model.force_stage = _first_stage_from_lengths(model, length, rows, levels[0])
+            length_fit = _length_stage(model, length, rows, levels[1], recipe)
+    model.linear = fit_linear(
+        length and length.where(choose_trials(length, length_trials, 'length')),
+        force and force.where(choose_trials(force, force_trials, 'force')))
     measure(model, force, force_trials, length, length_trials)
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit)
@@ -156,14 +187,12 @@ def _parts(measurement, rows):
     return [(trial, part) for trial, part in measurement.split() if rows[part.start]]
 
 
-def _force_stage(model, force, rows, levels, kind, anchored):
+def _force_stage(model, force, rows, levels, recipe):
     """Fit H1 to force against drive."""
     drive, target = force.column(model.drive), force.column('force')
     parts = [np.concatenate(([model.cold_drive], drive[part])) for _, part in _parts(force, rows)]
-    anchor = (model.cold_drive, float(target[rows][0])) if anchored else None
-    return fit_operator(kind, parts, target[rows], force.column('trial')[rows], levels,
-                        reversible=True,
-                        anchor=anchor)
+    return recipe.fit(parts, target[rows], force.column('trial')[rows], levels,
+                      (model.cold_drive, float(target[rows][0])))
 
 
 def _second_inputs(model, length, rows):
@@ -184,21 +213,20 @@ def _second_inputs(model, length, rows):
     return parts
 
 
-def _length_stage(model, length, rows, levels, kind, anchored=False):
+def _length_stage(model, length, rows, levels, recipe):
     """Fit H2 to length against F - H1[V]."""
-    anchor = (0.0, 0.0) if anchored else None
-    model.length_stage, fit = fit_operator(
-        kind, _second_inputs(model, length, rows), length.column(model.response)[rows],
-        length.column('trial')[rows], levels, anchor=anchor)
+    model.length_stage, fit = recipe.fit(
+        _second_inputs(model, length, rows), length.column(model.response)[rows],
+        length.column('trial')[rows], levels, (0.0, 0.0))
     return fit
 
 
-def _drive_stage(model, length, rows, levels, kind):
+def _drive_stage(model, length, rows, levels, recipe):
     """Fit one operator of the drive, of the sign that fits better."""
     results = []
     for sign in (-1, 1):
         model.sign = sign
-        fit = _length_stage(model, length, rows, levels, kind)
+        fit = _length_stage(model, length, rows, levels, recipe)
         predicted = model.predict(length)
         rmse = float(np.sqrt(np.mean((predicted - length.column(model.response))[rows] ** 2)))
         results.append((rmse, sign, model.length_stage, fit))
@@ -207,64 +235,13 @@ def _drive_stage(model, length, rows, levels, kind):
 
 
 def _first_stage_from_lengths(model, length, rows, levels):
-    """
-    Find H1 without a force table: the load that one unit of drive stands for.
-
-    H1 is a straight line whose slope lets H2 explain the lengths best, so the load is weighed
-    against the drive in the one way that the lengths themselves show.
-    """
-    low, high = model.ranges[model.drive]
-    load_low, load_high = model.ranges[model.load_name]
-    usual = max(load_high - load_low, abs(load_high), 1e-12) / max(high - low, 1e-12)
-    column = length.column(model.response)[rows]
-
-    def line(log_slope):
-        slope = usual * np.exp(log_slope)
-        return Linear(slope, -slope * low, min(low, model.cold_drive), high)
-
-    def rmse(log_slope):
-        model.force_stage = line(log_slope)
-        parts = _second_inputs(model, length, rows)
-        operator, _ = fit_operator('preisach', parts, column, length.column('trial')[rows],
-                                   levels[1], strength=1e-3)
-        outputs = []
-        for part in parts:
-            operator.reset()
-            outputs.append(operator.simulate(part)[1:])
-        return float(np.mean((np.concatenate(outputs) - column) ** 2))
-
-    grid = np.linspace(-2.0, 4.0, 13)
-    values = [rmse(value) for value in grid]
-    best = grid[int(np.argmin(values))]
-    found = optimize.minimize_scalar(rmse, bounds=(best - 0.5, best + 0.5), method='bounded',
-                                     options={'xatol': 0.02})
-    return line(found.x if found.fun < min(values) else best)
-
-
-def _linear(model, force, force_trials, length, length_trials):
-    """Fit Eq. 11 as the paper does: a line through the forces, then one through the lengths."""
-    if force is not None:
-        rows = choose_trials(force, force_trials, 'force')
-        k1, offset = np.polyfit(force.column(model.drive)[rows], force.column('force')[rows], 1)
-        if length is None:
-            return LinearModel(float(k1), 1.0, float(offset))
-        rows = choose_trials(length, length_trials, 'length')
-        z = length.column(model.load_name)[rows] if model.load_name else np.zeros(rows.sum())
-        z = z - k1 * length.column(model.drive)[rows] - offset
-        k2 = float(z @ length.column(model.response)[rows] / (z @ z))
-        return LinearModel(float(k1), k2, float(offset))
-    rows = choose_trials(length, length_trials, 'length')
-    drive, target = length.column(model.drive)[rows], length.column(model.response)[rows]
-    if model.load_name:
-        columns = np.column_stack([length.column(model.load_name)[rows], drive, np.ones(len(drive))])
-        scale = np.abs(columns).max(axis=0)
-        by_load, by_drive, offset = np.linalg.lstsq(
-            columns / scale, target, rcond=None)[0] / scale
-        if by_load != 0.0:
-            return LinearModel(float(-by_drive / by_load), float(by_load),
-                               float(-offset / by_load))
-    by_drive, offset = np.polyfit(drive, target, 1)
-    return LinearModel(float(-by_drive), 1.0, float(-offset))
+    """Find H1 without a force table, from the shift of the loops between loads."""
+    def columns(name):
+        values = length.column(name)
+        return [values[part] for _, part in _parts(length, rows)]
+    return first_stage_from_lengths(
+        columns(model.drive), columns(model.load_name), columns(model.response),
+        model.cold_drive, levels, squared=model.drive in ELECTRIC_DRIVES)
 
 
 def measure(model, force, force_trials, length, length_trials):

@@ -42,7 +42,6 @@ STRENGTHS = np.logspace(-9.0, -2.0, 15)
 SLACK = 2.5e-4, 0.01
 BLOCKS = 5          # blocks of steps held out in turn when there is one trial only
 FOLDS = 8           # more trials than this share folds, so that the time stays bounded
-ANCHOR_GAIN = 1e3   # an anchor counts as much as this many times all rows together
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def fit_weights(
         scale: Optional[np.ndarray] = None, penalty: Optional[np.ndarray] = None,
         sign: Optional[int] = 1, strength: Optional[float] = None,
         strengths: Optional[Sequence[float]] = None, slack: Optional[tuple] = None,
-        anchors: Sequence[Anchor] = ()) -> WeightFit:
+        anchor: Optional[Anchor] = None) -> WeightFit:
     """
     Identify weights of one sign and a free bias.
 
@@ -110,8 +109,8 @@ def fit_weights(
         Only strengths are chosen whose RMSE over the rows of the fit is above that of the weakest
         by at most the first share of P plus the second share of that RMSE; see `SLACK`. Default:
         no such limit.
-    anchors : sequence of Anchor
-        Outputs to be met within 1e-5 of the residual elsewhere.
+    anchor : Anchor, optional
+        Output to be met exactly; it takes the freedom of the bias.
 
     Returns
     -------
@@ -124,10 +123,10 @@ def fit_weights(
     """
     if sign is None:
         fits = [fit_weights(rows, target, groups=groups, scale=scale, penalty=penalty, sign=s,
-                            strength=strength, strengths=strengths, slack=slack, anchors=anchors)
+                            strength=strength, strengths=strengths, slack=slack, anchor=anchor)
                 for s in (1, -1)]
         return min(fits, key=lambda fit: fit.rmse)
-    problem = _Problem.build(rows, target, groups, scale, penalty, sign, anchors)
+    problem = _Problem.build(rows, target, groups, scale, penalty, sign, anchor)
     if strength == 0.0:
         return problem.plain()
     tried = np.sort(np.asarray(STRENGTHS if strengths is None else strengths, dtype=float))
@@ -151,9 +150,10 @@ def fit_weights(
 class _Problem:
     """The least squares problem in dimensionless form; the last column is the bias."""
 
-    design: np.ndarray      # (M, K + 1), columns of weight shares and a column of ones
+    design: np.ndarray      # (M, K + 1), weight shares, and ones (zeros if anchored)
     target: np.ndarray      # (M,), shares of P
-    extra: np.ndarray       # (A, K + 2), weighted anchor rows and their targets
+    anchor: Anchor          # what rows and target are counted from; zeros if not anchored
+    free: np.ndarray        # (K + 1,), whether an unknown has no bound: the bias, if not anchored
     penalty: np.ndarray     # (R, K + 1)
     folds: list
     unit: np.ndarray        # (K + 1,), weight = x * unit
@@ -161,7 +161,7 @@ class _Problem:
     sign: int
 
     @classmethod
-    def build(cls, rows, target, groups, scale, penalty, sign, anchors):
+    def build(cls, rows, target, groups, scale, penalty, sign, anchor):
         rows = np.asarray(rows, dtype=float)
         target = np.asarray(target, dtype=float)
         if rows.ndim != 2 or target.shape != rows.shape[:1] or 0 in rows.shape:
@@ -187,27 +187,21 @@ class _Problem:
         if groups.shape != target.shape:
             raise IdentificationError('least squares: every row needs its trial')
         unit = np.append(sign * output_range / scale, output_range)
-        extra = np.array([
-            np.concatenate([anchor.row * unit[:-1] / output_range, [1.0],
-                            [anchor.value / output_range]]) for anchor in anchors])
+        bias = np.ones(len(target)) if anchor is None else np.zeros(len(target))
+        free = np.append(np.zeros(size, dtype=bool), anchor is None)
+        anchor = anchor or Anchor(np.zeros(size), 0.0)
+        shares = (rows - anchor.row) * (unit[:-1] / output_range)
         return cls(
-            design=np.column_stack([rows * (unit[:-1] / output_range), np.ones(len(target))]),
-            target=target / output_range,
-            extra=ANCHOR_GAIN * extra.reshape(len(anchors), size + 2),
+            design=np.column_stack([shares, bias]),
+            target=(target - anchor.value) / output_range, anchor=anchor, free=free,
             penalty=np.column_stack([penalty, np.zeros(len(penalty))]),
             folds=folds_of(groups), unit=unit, output_range=output_range, sign=sign)
-
-    @property
-    def free(self) -> np.ndarray:
-        """Mark the bias, the one unknown without a bound."""
-        return np.arange(len(self.unit)) == len(self.unit) - 1
 
     @functools.cached_property
     def _reduced(self) -> tuple:
         """Mean square problem with no more rows than unknowns, by one QR: (design, target)."""
         root = np.sqrt(len(self.target))
-        design = np.vstack([self.design / root, self.extra[:, :-1]])
-        target = np.append(self.target / root, self.extra[:, -1])
+        design, target = self.design / root, self.target / root
         if len(target) <= design.shape[1]:
             return design, target
         orthogonal, triangle = linalg.qr(design, mode='economic')
@@ -256,11 +250,9 @@ class _Problem:
         return path[::-1]
 
     def _moments(self, rows):
-        """Return the mean Gram matrix and the mean of design times target, anchors added."""
+        """Return the mean Gram matrix and the mean of design times target."""
         design, target = self.design[rows], self.target[rows]
-        anchored = self.extra[:, :-1].T @ self.extra
-        return (design.T @ design / len(target) + anchored[:, :-1],
-                design.T @ target / len(target) + anchored[:, -1])
+        return design.T @ design / len(target), design.T @ target / len(target)
 
     def regularised(self, strength, strengths=(), validation=(), held_out=None) -> WeightFit:
         """Fit all rows; `held_out` are errors of held-out rows, shape (M,), if there are any."""
@@ -289,20 +281,21 @@ class _Problem:
         return np.where(self.free, polished, np.maximum(polished, 0.0))
 
     def _result(self, x, passive, covariance, noise, strength, strengths, validation):
-        values = x * self.unit
+        weights = x[:-1] * self.unit[:-1]
+        bias = float(x[-1] * self.unit[-1] + self.anchor.value - self.anchor.row @ weights)
         triangle = self._reduced[0]
         singular = np.linalg.svd(triangle, compute_uv=False)
         rank = int(np.count_nonzero(
             singular > singular[0] * max(self.design.shape) * np.finfo(float).eps))
         still = np.ptp(self.design[:, :-1], axis=0) <= 1e-12
-        fitted = (self.design @ x) * self.output_range
-        target = self.target * self.output_range
+        fitted = (self.design @ x) * self.output_range + self.anchor.value
+        target = self.target * self.output_range + self.anchor.value
         scaled = np.outer(self.unit[passive], self.unit[passive]) / self.output_range ** 2
         return WeightFit(
-            weights=values[:-1], bias=float(values[-1]), sign=self.sign, strength=strength,
+            weights=weights, bias=bias, sign=self.sign, strength=strength,
             strengths=strengths, validation=validation, fitted=fitted, residual=fitted - target,
             output_range=self.output_range, rank=rank,
             condition=float(singular[0] / singular[rank - 1]),
             never_excited=tuple(int(k) for k in np.flatnonzero(still)),
             noise_std=noise * self.output_range, active=np.flatnonzero(passive),
-            covariance=covariance * scaled)
+            covariance=covariance * scaled, origin=self.anchor.row)

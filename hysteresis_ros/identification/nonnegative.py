@@ -52,12 +52,8 @@ def solve_nonnegative(
     for _ in range(20 * size):
         index = np.flatnonzero(passive)
         x = np.zeros(size)
-        try:
-            factor = linalg.cho_factor(gram[np.ix_(index, index)], check_finite=False)
-        except linalg.LinAlgError:
-            raise IdentificationError(
-                'least squares: the problem is singular; use a strength above 0') from None
-        x[index] = linalg.cho_solve(factor, moment[index], check_finite=False)
+        if len(index):
+            x[index] = _solve(gram[np.ix_(index, index)], moment[index])
         gradient = gram @ x - moment
         wrong = (passive & ~free & (x < -1e-12 * np.max(np.abs(x)))) | (
             ~passive & (gradient < -gradient_tolerance))
@@ -75,6 +71,15 @@ def solve_nonnegative(
         passive = passive ^ wrong
     raise IdentificationError(
         'least squares: no solution found; use a larger strength or fewer levels')
+
+
+def _solve(gram, moment):
+    try:
+        factor = linalg.cho_factor(gram, check_finite=False)
+    except linalg.LinAlgError:
+        raise IdentificationError(
+            'least squares: the problem is singular; use a strength above 0') from None
+    return linalg.cho_solve(factor, moment, check_finite=False)
 
 
 def quick_weights(rows: np.ndarray, target: np.ndarray, scale: np.ndarray, penalty: np.ndarray,

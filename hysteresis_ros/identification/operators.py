@@ -17,6 +17,8 @@ from hysteresis_ros.operators import (
 MARGIN = 1e-6
 # Of the penalty: density of the cells, and of the reversible weights, against its smoothness.
 CELL_RIDGE, REVERSIBLE_RIDGE = 0.1, 10.0
+# Rows that a search over parameters that are not weights looks at, besides the turning points.
+SEARCH_ROWS = 400
 
 
 def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, groups: np.ndarray,
@@ -134,16 +136,30 @@ def fit_preisach(parts, target, nodes, *, groups=None, anchor=None, reversible=T
     scale = cell_areas(nodes)
     if reversible:
         scale = np.append(scale, np.diff(nodes))
-    anchors = ()
-    if anchor is not None:
-        row = preisach_rows(nodes, np.array([anchor[0]]), reversible)[0]
-        anchors = (Anchor(row, anchor[1]),)
+    known = None if anchor is None else Anchor(
+        preisach_rows(nodes, np.array([anchor[0]]), reversible)[0], anchor[1])
     fit = fit_weights(rows, target, groups=groups, scale=scale, sign=1, strength=strength,
                       strengths=strengths, slack=SLACK, penalty=smoothness(nodes, reversible),
-                      anchors=anchors)
+                      anchor=known)
     count = len(cell_areas(nodes))
     return Preisach(nodes, fit.weights[:count], fit.bias,
                     fit.weights[count:] if reversible else None), fit
+
+
+def thinned(drive: np.ndarray, most: int) -> np.ndarray:
+    """
+    Return the rows of one trial to keep, ascending: about `most` and every turning point.
+
+    An operator without rate gives the same output in the rows kept as with all of them.
+    """
+    count = len(drive)
+    keep = np.zeros(count, dtype=bool)
+    keep[:: max(1, -(-count // most))] = True
+    keep[[0, -1]] = True
+    moves = np.flatnonzero(np.diff(drive))
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(drive)[moves])))
+    keep[moves[turns] + 1] = True
+    return np.flatnonzero(keep)
 
 
 def _play(parts, target, low, high, levels, options):
@@ -165,21 +181,36 @@ def _play(parts, target, low, high, levels, options):
 
 def _bouc_wen(parts, target, low, high):
     """Rate, shape and exponent by search; stiffness, gain and bias by linear least squares."""
-    def design(vector):
-        rate, shape, exponent = np.exp(vector[0]), 0.5 + np.exp(vector[1]), 1.0 + np.exp(vector[2])
+    kept = [thinned(part, SEARCH_ROWS // len(parts)) for part in parts]
+    # Row n of a part is output n - 1 of its trial.
+    starts = np.cumsum([0] + [len(part) - 1 for part in parts[:-1]])
+    outputs = target[np.concatenate([start + rows[1:] - 1 for start, rows in zip(starts, kept)])]
+    parts = [part[rows] for part, rows in zip(parts, kept)]
+    inputs = np.concatenate([part[1:] for part in parts])
+
+    def fit(vector):
+        rate, shape, exponent = _bouc_wen_shape(vector, high - low)
         states = []
         for part in parts:
             unit = BoucWen(0.0, 1.0, rate, shape, exponent, 0.0, low, high)
             states.append(unit.simulate(part)[1:])
-        inputs = np.concatenate([part[1:] for part in parts])
         rows = np.column_stack([inputs, np.concatenate(states)])
         scale = np.maximum(np.ptp(rows, axis=0), 1e-12 * (high - low))
-        fit = fit_weights(rows, target, scale=scale, sign=1, strength=1e-9)
-        return fit, (rate, shape, exponent)
+        return fit_weights(rows, outputs, scale=scale, sign=1, strength=1e-9)
 
-    start = np.array([np.log(6.0 / (high - low)), 0.0, 0.0])
-    found = optimize.minimize(lambda vector: design(np.clip(vector, start - 4.0, start + 4.0))[
-        0].rmse, start, method='Nelder-Mead', options={'maxfev': 120, 'xatol': 0.01, 'fatol': 0.0})
-    fit, (rate, shape, exponent) = design(np.clip(found.x, start - 4.0, start + 4.0))
-    return BoucWen(float(fit.weights[0]), float(fit.weights[1]), float(rate), float(shape),
-                   float(exponent), float(fit.bias), low, high)
+    # Slow to fast turning of the hidden state; the shape and the exponent matter less.
+    grid = [np.array([rate, 0.0, 0.0]) for rate in np.linspace(0.0, 5.0, 6)]
+    start = min(grid, key=lambda vector: fit(vector).rmse)
+    found = optimize.minimize(
+        lambda vector: fit(vector).rmse, start, method='Nelder-Mead',
+        options={'initial_simplex': start + np.vstack([np.zeros(3), 0.7 * np.eye(3)]),
+                 'maxfev': 100, 'xatol': 0.01, 'fatol': 0.0})
+    best = fit(found.x)
+    return BoucWen(float(best.weights[0]), float(best.weights[1]),
+                   *_bouc_wen_shape(found.x, high - low), float(best.bias), low, high)
+
+
+def _bouc_wen_shape(vector, span):
+    """Return rate, shape and exponent inside their ranges for any vector of three numbers."""
+    rate, shape, exponent = np.exp(np.clip(vector, -4.0, 6.0))
+    return float(rate / span), 0.5 + float(min(shape, 50.0)), 1.0 + float(min(exponent, 20.0))

@@ -30,7 +30,7 @@ class WeightFit:
     output_range : float
         P of Eqs. 23 and 24.
     rank : int
-        Rank of rows, bias and anchors; below K + 1 the plain problem has no unique solution.
+        Rank of rows and bias; below K + 1 the plain problem has no unique solution.
     condition : float
         Largest over smallest singular value within that rank.
     never_excited : tuple of int
@@ -39,9 +39,11 @@ class WeightFit:
         Standard deviation of one output about the prediction: from held-out rows, or from the
         residual and its degrees of freedom where nothing was held out.
     active : ndarray of int
-        Weights off their bound, and last the bias.
+        Weights off their bound, and last the bias if it is free.
     covariance : ndarray
         Of those, for a unit `noise_std`.
+    origin : ndarray, shape (K,)
+        Row at which the output is known exactly; zeros without an anchor.
     """
 
     weights: np.ndarray
@@ -59,6 +61,7 @@ class WeightFit:
     noise_std: float
     active: np.ndarray
     covariance: np.ndarray
+    origin: np.ndarray
 
     @property
     def mean_percent(self) -> float:
@@ -88,7 +91,7 @@ class WeightFit:
         of the model as well as the noise.
         """
         rows = np.asarray(rows, dtype=float)
-        design = np.column_stack([rows, np.ones(len(rows))])[:, self.active]
+        design = np.column_stack([rows - self.origin, np.ones(len(rows))])[:, self.active]
         spread = np.sum((design @ self.covariance) * design, axis=1)
         freedom = max(1, len(self.residual) - 1)
         half = (stats.t.ppf(0.5 + 0.5 * level, freedom) * self.noise_std
