@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from hysteresis_ros.bicep.geometry import BicepGeometry
@@ -17,11 +18,14 @@ from hysteresis_ros.model.muscle import MuscleModel
 from hysteresis_ros.operators import operator_from_dict
 
 SCHEMA = 1
+# No model comes near these; a file that does is no model, and could bring the parser down.
+LARGEST_FILE = 20_000_000
+DEEPEST_NESTING = 40
 
 
 def to_dict(model: MuscleModel) -> dict:
     """Return the model as plain types, in the order in which a person reads it."""
-    content = {
+    return _plain({
         'schema': SCHEMA, 'kind': model.kind,
         'drive': model.drive, 'load': model.load_name, 'response': model.response,
         'sign': model.sign, 'mean_load': float(model.mean_load),
@@ -34,8 +38,20 @@ def to_dict(model: MuscleModel) -> dict:
         'force_stage': model.force_stage.to_dict() if model.force_stage else None,
         'length_stage': model.length_stage.to_dict() if model.length_stage else None,
         'provenance': model.provenance,
-    }
-    return content
+    })
+
+
+def _plain(value):
+    """Return a copy of plain types: no NumPy numbers, no tuples, nothing shared."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    return value
 
 
 def save(model: MuscleModel, path) -> None:
@@ -66,11 +82,12 @@ def load(path) -> MuscleModel:
     OSError
         If it cannot be read.
     """
+    if Path(path).stat().st_size > LARGEST_FILE:
+        raise ModelFileError(f'{path}: not a model file, it is larger than '
+                             f'{LARGEST_FILE // 1_000_000} MB')
     try:
-        text = Path(path).read_text(encoding='utf-8')
-        loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-        content = yaml.load(text, Loader=loader)
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        content = _parse(Path(path).read_text(encoding='utf-8'))
+    except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
         first = ' '.join(str(error).split())
         raise ModelFileError(f'{path}: not a model file ({first[:120]})') from None
     if not isinstance(content, Mapping) or 'schema' not in content:
@@ -84,15 +101,38 @@ def load(path) -> MuscleModel:
         raise ModelFileError(f'{path}: the model file lacks {error}') from None
     except HysteresisError as error:
         raise ModelFileError(f'{path}: {error}') from None
-    except (TypeError, ValueError, AttributeError) as error:
-        raise ModelFileError(f'{path}: damaged model file ({error})') from None
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        first = ' '.join(str(error).split())
+        raise ModelFileError(f'{path}: damaged model file ({first[:120]})') from None
+
+
+def _parse(text: str):
+    """Return the content of YAML text, by safe load only."""
+    loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+    depth = 0
+    # The fast parser builds nested values by recursion in C, without a limit of its own.
+    for event in yaml.parse(text, Loader=loader):
+        if isinstance(event, yaml.AliasEvent):
+            raise ValueError('it has references, which no model file has')
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST_NESTING:
+            raise ValueError('it is nested too deeply')
+    return yaml.load(text, Loader=loader)
 
 
 def from_dict(content: Mapping) -> MuscleModel:
-    """Build the model from what `to_dict` returned."""
+    """
+    Build the model from what `to_dict` returned.
+
+    Raises
+    ------
+    HysteresisError, KeyError, TypeError, ValueError
+        If a part is missing or makes no sense; `load` makes one kind of error of them.
+    """
     ranges = {str(name): (_number(low, name), _number(high, name))
               for name, (low, high) in content['ranges'].items()}
-    if content['sign'] not in (-1, 1):
+    if isinstance(content['sign'], bool) or content['sign'] not in (-1, 1):
         raise ModelFileError(f'sign must be -1 or 1, not {content["sign"]!r}')
     model = MuscleModel(
         kind=str(content['kind']), drive=str(content['drive']),
@@ -100,7 +140,7 @@ def from_dict(content: Mapping) -> MuscleModel:
         response=str(content['response']),
         length_stage=_operator(content['length_stage']),
         force_stage=_operator(content['force_stage']),
-        sign=content['sign'],
+        sign=int(content['sign']),
         linear=LinearModel.from_dict(content['linear']) if content['linear'] else None,
         geometry=(BicepGeometry.from_mapping(content['geometry'], 'model file')
                   if content['geometry'] else None),
@@ -118,7 +158,7 @@ def _effect(entry: Mapping, surroundings):
     parameters = entry['parameters']
     effect = effect_class(entry['id'])(surroundings, **{
         name: _number(parameter['value'], name) for name, parameter in parameters.items()})
-    effect.intervals = {name: (_number(parameter['low'], name), _number(parameter['high'], name))
+    effect.intervals = {name: (_limit(parameter['low'], name), _limit(parameter['high'], name))
                         for name, parameter in parameters.items()}
     return effect
 
@@ -127,3 +167,10 @@ def _number(value, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise ModelFileError(f'{name} is {value!r}, it has to be a finite number')
     return float(value)
+
+
+def _limit(value, name: str) -> float:
+    """End of an interval: data that say nothing leave it open."""
+    if isinstance(value, float) and math.isinf(value):
+        return value
+    return _number(value, f'interval of {name}')
