@@ -7,8 +7,7 @@ The muscle stretches to ``L = L0 + S(F) f (H2[u] - L0) + e(F) + o`` with ``u = F
 the first stage's output (H1[V] in the paper's model) and F is what the arm asks for at its angle.
 At rest ``L(theta) = H2[F(theta) - x]``; the unknown is u, because H2 then gives everything else.
 Dry friction lets F lie in a band, inside which the arm sticks; viscous friction and inertia add
-what the present velocity and acceleration cost (implicit Euler). S and e take the F of the arm at
-rest, without what resists its motion.
+what the present velocity and acceleration cost (implicit Euler), which S and e leave out.
 """
 
 import bisect
@@ -56,22 +55,11 @@ class ArmBalance:
         self.coulomb, self.viscous, self.inertia = (
             sum(values) for values in zip((0.0, 0.0, 0.0), *resistances))
         leverage = geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6)
-        # A wire cannot push.
-        force = np.maximum(statics.moment / leverage, 0.0)
-        load, weight = 0.0 * force, 0.0 * force
-        if loaded:
-            load = chain.load_inside(force)
-            weight = chain.load_inside(force + 1.0) - load
         self.base = operator.output_range[0]
-        scale = chain.scale(force) + 0.0 * force
-        demand = (statics.length - self.base - chain.stretch(force)) / scale
         self._theta = theta.tolist()
-        # Past a fold, where the arm would fall, the nearest stable state is kept.
-        self._demand = np.maximum.accumulate(demand).tolist()
-        self._strain = None if np.all(scale == 1.0) else (1.0 / scale).tolist()
-        self._load = load.tolist()
-        # What a moment that resists motion changes in the load.
-        self._resist = (weight / leverage).tolist()
+        # Lines of state for an arm that slides down, rests, and slides up.
+        self._lines = {drag: _Line(statics, leverage, drag * self.coulomb, self.base, chain, loaded)
+                       for drag in ((-1, 0, 1) if self.coulomb > 0.0 else (0,))}
         self.has_dynamics = self.viscous > 0.0 or self.inertia > 0.0
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
         self._bundle = Bundle(operator, chain.offsets) if len(chain.offsets) > 1 else None
@@ -88,10 +76,8 @@ class ArmBalance:
 
     def settle(self, x: float) -> float:
         """Take up the state of rest under `x`, the cold one, and return its angle [rad]."""
-        friction, self.coulomb = self.coulomb, 0.0
-        angle = self.step(x, math.inf)
-        self.coulomb = friction
-        return angle
+        self._angle = None
+        return self.step(x, math.inf)
 
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0) -> float:
         """
@@ -122,67 +108,60 @@ class ArmBalance:
         moving = self.has_dynamics and dt < LONGEST_TRANSIENT and self._angle is not None
         if moving and dt <= 0.0:
             return self._angle
+        dt = dt if moving else 0.0
+        drag = 0
+        if self.coulomb > 0.0 and self._angle is not None:
+            drag = self._direction(x, offset, factor, dt)
+            if drag == 0:
+                self._velocity = 0.0
+                return self._angle
+        line = self._lines[drag]
         solve = self._solve if self._bundle is None else self._solve_bundle
-        demand = solve(x, offset, factor, dt if moving else 0.0)
-        k, share = self._place(demand, offset)
+        k, share = line.place(solve(line, x, offset, factor, dt), offset)
         angle = self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
         self._velocity = (angle - self._angle) / dt if moving else 0.0
         self._angle = angle
         return angle
 
-    def _place(self, demand, offset):
-        """Interval on the grid, and share of it, for what the transformation has to give."""
-        grid, strain = self._demand, self._strain
-        if strain is None or offset == 0.0:
-            demand += offset
-            k = min(max(bisect.bisect_right(grid, demand), 1), len(grid) - 1)
-            below, above = grid[k - 1], grid[k]
+    def _direction(self, x, offset, factor, dt):
+        """Direction in which the arm slides, 0 where friction holds it."""
+        place = self._present()
+        if self._bundle is None:
+            tension = self.operators[0].input + x
         else:
-            # The offset is not part of the strain that the load scales.
-            k = bisect.bisect_right(range(len(grid)), demand,
-                                    key=lambda row: grid[row] - offset * strain[row])
-            k = min(max(k, 1), len(grid) - 1)
-            below = grid[k - 1] - offset * strain[k - 1]
-            above = grid[k] - offset * strain[k]
-        if demand <= below:
-            return k, 0.0
-        return k, 1.0 if demand >= above else (demand - below) / (above - below)
+            output = self.base + self._lines[0].demand_at(*place, offset) / factor
+            tension = self._bundle.share(self._bundle.inputs(output), x)
+        if self._required(self._lines[1], *place, dt) > tension:
+            return 1
+        return -1 if self._required(self._lines[-1], *place, dt) < tension else 0
 
-    def _required(self, demand, offset, drag, dt):
-        """Load that the arm asks for, moving towards `demand` within `dt`."""
-        k, share = self._place(demand, offset)
-        load = self._load[k - 1] + share * (self._load[k] - self._load[k - 1])
-        if drag or dt:
-            moment = drag * self.coulomb
-            if dt:
-                theta = self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
-                speed = (theta - self._angle) / dt
-                moment += self.viscous * speed + self.inertia * (speed - self._velocity) / dt
-            load -= moment * (
-                self._resist[k - 1] + share * (self._resist[k] - self._resist[k - 1]))
+    def _present(self):
+        """Interval on the grid, and share of it, of the present angle."""
+        theta = self._theta
+        k = min(max(bisect.bisect_right(theta, self._angle), 1), len(theta) - 1)
+        return k, (self._angle - theta[k - 1]) / (theta[k] - theta[k - 1])
+
+    def _required(self, line, k, share, dt):
+        """Load that the arm asks for at a place of the grid, reached within `dt`."""
+        load = line.load[k - 1] + share * (line.load[k] - line.load[k - 1])
+        if dt:
+            theta = self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
+            speed = (theta - self._angle) / dt
+            moment = self.viscous * speed + self.inertia * (speed - self._velocity) / dt
+            load -= moment * (line.resist[k - 1] + share * (line.resist[k] - line.resist[k - 1]))
         return load
 
-    def _drag(self, demand, offset, lacking):
-        """Direction in which the arm slides, 0 if friction holds it; `lacking` is its want."""
-        k, share = self._place(demand, offset)
-        resist = self._resist[k - 1] + share * (self._resist[k] - self._resist[k - 1])
-        return 0.0 if abs(lacking) <= self.coulomb * resist else math.copysign(1.0, lacking)
-
-    def _solve(self, x, offset, factor, dt):
+    def _solve(self, line, x, offset, factor, dt):
         """Commit the u next to the present one with load(theta(H2[u])) - x - u = 0."""
-        operator, base, tolerance = self.operators[0], self.base, self.tolerance
-        peek, required = operator.peek, self._required
-        drag = 0.0
+        operator, base = self.operators[0], self.base
+        peek, place, required = operator.peek, line.place, self._required
 
         def residual(u):
-            return required(factor * (peek(u) - base), offset, drag, dt) - x - u
+            return required(line, *place(factor * (peek(u) - base), offset), dt) - x - u
 
         u = operator.input
         here = residual(u)
-        if self.coulomb > 0.0:
-            drag = self._drag(factor * (operator.output - base), offset, here)
-            here = residual(u) if drag else 0.0
-        if abs(here) > tolerance:
+        if abs(here) > self.tolerance:
             operator.step(self._root(residual, u, here))
         return factor * (operator.output - base)
 
@@ -213,31 +192,70 @@ class ArmBalance:
         self._gain = min(max((far - first) / initial, 0.5), 10.0)
         return far
 
-    def _solve_bundle(self, x, offset, factor, dt):
+    def _solve_bundle(self, line, x, offset, factor, dt):
         """Commit the elongation in which muscles of unequal length balance the arm."""
-        bundle, base, grid = self._bundle, self.base, self._demand
-        drag = 0.0
+        bundle, base = self._bundle, self.base
 
         def required(output):
-            return self._required(factor * (output - base), offset, drag, dt)
+            return self._required(line, *line.place(factor * (output - base), offset), dt)
 
-        room = abs(offset) * max(self._strain or [1.0])
-        low, high = base + (grid[0] - room) / factor, base + (grid[-1] + room) / factor
-        present = high if self._angle is None else base + self._present(offset) / factor
-        if self.coulomb > 0.0:
-            here = required(present) - bundle.share(bundle.inputs(present), x)
-            drag = self._drag(factor * (present - base), offset, here)
-            if drag == 0.0:
-                return factor * (present - base)
-        output = bundle.settle(required, x, low, high, present)
+        last = len(self._theta) - 1
+        low = base + line.demand_at(1, 0.0, offset) / factor
+        high = base + line.demand_at(last, 1.0, offset) / factor
+        near = high
+        if self._angle is not None:
+            near = base + line.demand_at(*self._present(), offset) / factor
+        output = bundle.settle(required, x, low, high, near)
         bundle.step(bundle.inputs(output))
         return factor * (output - base)
 
-    def _present(self, offset):
-        """What the transformation gives at the present angle."""
-        demand = float(np.interp(self._angle, self._theta, self._demand))
-        if offset != 0.0:
-            strain = 1.0 if self._strain is None else float(
-                np.interp(self._angle, self._theta, self._strain))
-            demand -= offset * strain
-        return demand
+
+class _Line:
+    """
+    States of the arm on a grid of angles, at rest or against a moment of friction.
+
+    `demand` is what the transformation has to give at each angle, without offset, and never falls;
+    `load` is what it feels there, `resist` what a moment that resists motion takes off it, and
+    `strain` what an offset counts in the demand, None where that is one.
+    """
+
+    def __init__(self, statics, leverage, friction, base, chain, loaded):
+        # A wire cannot push.
+        force = np.maximum(statics.moment - friction, 0.0) / leverage
+        load, weight = 0.0 * force, 0.0 * force
+        if loaded:
+            load = chain.load_inside(force)
+            weight = chain.load_inside(force + 1.0) - load
+        scale = chain.scale(force) + 0.0 * force
+        demand = (statics.length - base - chain.stretch(force)) / scale
+        # Past a fold, where the arm would fall, the nearest stable state is kept.
+        self.demand = np.maximum.accumulate(demand).tolist()
+        self.load = load.tolist()
+        self.resist = (weight / leverage).tolist()
+        self.strain = None if np.all(scale == 1.0) else (1.0 / scale).tolist()
+
+    def place(self, demand, offset):
+        """Interval on the grid, and share of it, for what the transformation gives."""
+        grid, strain = self.demand, self.strain
+        if strain is None or offset == 0.0:
+            demand += offset
+            k = min(max(bisect.bisect_right(grid, demand), 1), len(grid) - 1)
+            below, above = grid[k - 1], grid[k]
+        else:
+            # The offset is not part of the strain that the load scales.
+            k = bisect.bisect_right(range(len(grid)), demand,
+                                    key=lambda row: grid[row] - offset * strain[row])
+            k = min(max(k, 1), len(grid) - 1)
+            below = grid[k - 1] - offset * strain[k - 1]
+            above = grid[k] - offset * strain[k]
+        if demand <= below:
+            return k, 0.0
+        return k, 1.0 if demand >= above else (demand - below) / (above - below)
+
+    def demand_at(self, k, share, offset):
+        """What the transformation has to give at a place of the grid: `place` inverted."""
+        grid, strain = self.demand, self.strain
+        demand = grid[k - 1] + share * (grid[k] - grid[k - 1])
+        if strain is None:
+            return demand - offset
+        return demand - offset * (strain[k - 1] + share * (strain[k] - strain[k - 1]))

@@ -43,8 +43,8 @@ class Bundle:
         inputs = []
         for operator, excess in zip(self.operators, self.offsets):
             wanted = output - excess
-            found = operator.invert(wanted)
-            inputs.append(found.input + ELASTICITY * (wanted - found.output))
+            u, given, _ = operator.solve(wanted)
+            inputs.append(u + ELASTICITY * (wanted - given))
         return inputs
 
     @staticmethod

@@ -310,6 +310,8 @@ class UnequalMuscles(MaterialEffect):
                   (0.5, 2.0)),)
 
     @property
-    def offsets(self) -> tuple[float, float, float]:
-        """Excess length [m] of each muscle."""
+    def offsets(self) -> tuple:
+        """Excess length [m] of each muscle; equal ones count as one."""
+        if self.shorter == self.longer == 0.0:
+            return (0.0,)
         return -1e-3 * self.shorter, 0.0, 1e-3 * self.longer

@@ -102,7 +102,10 @@ class Latency(SensorEffect):
 
     def step(self, value, step):
         """Interpolate in what was seen within the delay."""
-        past = [[age + step, old] for age, old in self._past if age < self.delay]
-        self._past = [*past, [0.0, value]]
+        past = [[age + step, old] for age, old in self._past]
+        past.append([0.0, value])
+        # One sample beyond the delay is needed, none before that.
+        beyond = sum(age >= self.delay for age, _ in past)
+        self._past = past[max(beyond - 1, 0):]
         ages, values = zip(*reversed(self._past))
         return float(np.interp(self.delay, ages, values))

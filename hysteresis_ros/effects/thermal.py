@@ -162,11 +162,6 @@ class LatentHeat(FirstOrderLag):
         self._heat = super().step(value, step, phase, surroundings) + released
         return self._heat
 
-    def inverse(self, signal, inputs, surroundings):
-        """Bring up what the transformation on the way to `signal` takes up, too."""
-        released = self._released(inputs.phase, surroundings)
-        return super().inverse(signal - released, inputs, surroundings)
-
     def _released(self, phase, surroundings):
         """Return the heat that changing from the phase before to `phase` gives off."""
         if self._phase is None or not math.isfinite(phase):

@@ -12,14 +12,13 @@ from scipy import optimize
 
 from hysteresis_ros.bicep.geometry import Reference
 from hysteresis_ros.effects import Inputs, Statics
+from hysteresis_ros.effects.thermal import LatentHeat
 from hysteresis_ros.errors import ParameterError, RangeError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.muscles import Muscles
 
 # Passes that bring a clipped drive into agreement with the phase that it causes.
 PHASE_PASSES = 20
-# Pieces [s] in which a muscle with latent heat is followed on its way.
-PHASE_STEP = 0.1
 
 
 class Setpoint(NamedTuple):
@@ -87,7 +86,7 @@ class Controller:
 
     # What is remembered beside the operators and the effects.
     _MEMORY = ('_fresh', '_arm', '_voltage', '_travel', '_angle', '_direction', '_time', '_period',
-               '_deadline', '_target', '_felt', '_start', '_phase', '_phase_before', '_ambient')
+               '_deadline', '_target', '_phase', '_ambient')
 
     def __init__(self, model, voltage_limits=None, dead_band: float = 0.0,
                  horizon: float = math.inf, arm: bool = False):
@@ -99,6 +98,10 @@ class Controller:
         self.horizon = horizon
         usable = [effect for effect in model.effects
                   if effect.invertible or effect.stage in ('mechanism', 'sensor')]
+        # What the transformation takes up on the way is not foreseen: overdriven as by a mere lag,
+        # the muscle comes later, but never too far.
+        usable = [effect.with_values(latent=0.0) if isinstance(effect, LatentHeat) else effect
+                  for effect in usable]
         self._chain = Chain(usable, model.surroundings)
         self._steady = Chain([effect for effect in usable if not effect.needs_transients],
                              model.surroundings)
@@ -126,10 +129,10 @@ class Controller:
             self._force.step(cold)
         self._fresh = True
         self._voltage = cold
-        self._angle = self._time = self._felt = self._ambient = None
+        self._angle = self._time = self._ambient = None
         self._direction = self._period = self._deadline = 0.0
-        self._target = self._start = heat
-        self._phase = self._phase_before = 1.0
+        self._target = heat
+        self._phase = 1.0
 
     def save(self) -> dict:
         """Return the memory as plain types, fit for JSON and YAML."""
@@ -308,26 +311,28 @@ class Controller:
             raise ParameterError('the model has no length stage; identify it with a length table')
         if not (math.isfinite(length) and math.isfinite(force)):
             return self._no_number()
+        if commit:
+            return self._setpoint(length, force, time, ambient)
+        before = self.save()
+        found = self._setpoint(length, force, time, ambient)
+        self._take(before)
+        return found
+
+    def _setpoint(self, length, force, time, ambient):
         self._advance(time)
         load = float(self._chain.load_inside(np.float64(force))) if self._first.loaded else 0.0
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
             self._muscles.settle_cold(self._cold, load, self._at_rest()[1] if self._arm else None)
-        phase = float(self.model.martensite(length))
-        inputs = self._inputs(0.0, phase, ambient)
+        inputs = self._inputs(0.0, float(self.model.martensite(length)), ambient)
         find = self._search if self._steady.drifts else self._invert
         drive, saturated = find(length, force, load, inputs)
         outcome = self._outcome(drive, force, load, inputs)
         if saturated and self._chain.needs_phase:
             for _ in range(PHASE_PASSES):
-                phase = float(self.model.martensite(outcome.length))
-                inputs = inputs._replace(phase=phase)
+                inputs = inputs._replace(phase=float(self.model.martensite(outcome.length)))
                 outcome = self._outcome(drive, force, load, inputs)
-        applied = drive
-        if commit:
-            applied = self._commit(drive, outcome, inputs, time)
-        elif time is not None and math.isfinite(self.horizon):
-            applied = self._towards(outcome.heat, phase, self.horizon)
+        applied = self._commit(drive, outcome, inputs, time)
         reason = ''
         if saturated:
             limits = f'{self.limits[0]:.4g} to {self.limits[1]:.4g}'
@@ -385,8 +390,9 @@ class Controller:
         self._muscles.step(outcome.muscles)
         self._steady.advance(drive, outcome.heat, self._worn(inputs, drive))
         self._fresh = False
-        self._start, self._target = self._felt, outcome.heat
-        self._phase_before, self._phase = self._present_phase(), inputs.phase
+        self._target, self._phase = outcome.heat, inputs.phase
+        if math.isfinite(inputs.ambient):
+            self._ambient = inputs.ambient
         if time is not None and math.isfinite(self.horizon):
             self._deadline = time + self.horizon
             drive = self._towards(outcome.heat, inputs.phase, self.horizon)
@@ -425,30 +431,18 @@ class Controller:
         if time is None or not math.isfinite(time):
             return
         if self._time is None:
-            self._felt = self._chain.step(self._voltage, self._inputs(0.0, self._phase, math.nan))
+            self._chain.step(self._voltage, self._inputs(0.0, self._phase, math.nan))
             self._time = time
         elapsed = time - self._time
         if elapsed <= 0.0:
             return
-        pieces = min(math.ceil(elapsed / PHASE_STEP), 1000) if self._chain.needs_phase else 1
-        for _ in range(pieces):
-            self._felt = self._chain.step(self._voltage, self._inputs(
-                elapsed / pieces, self._present_phase(), math.nan))
+        self._chain.step(self._voltage, self._inputs(elapsed, self._phase, math.nan))
         self._time, self._period = time, elapsed
 
-    def _present_phase(self):
-        """Martensite share on the way from the last reference but one to the last."""
-        if self._felt is None or self._start is None or self._target == self._start:
-            return self._phase
-        share = (self._felt - self._start) / (self._target - self._start)
-        share = min(max(share, 0.0), 1.0)
-        return self._phase_before + share * (self._phase - self._phase_before)
-
     def _inputs(self, step, phase, ambient) -> Inputs:
-        if math.isfinite(ambient):
-            self._ambient = ambient
-        known = math.nan if self._ambient is None else self._ambient
-        return Inputs(0.0, 0.0, step, known, phase, 0.0)
+        if not math.isfinite(ambient) and self._ambient is not None:
+            ambient = self._ambient
+        return Inputs(0.0, 0.0, step, ambient, phase, 0.0)
 
     def _worn(self, inputs, drive):
         """Return the inputs with the cycles that there will be after `drive`."""
