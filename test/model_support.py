@@ -1,0 +1,90 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A small model of the bicep for tests, made by formula, and measurements to feed it with."""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.effects import catalogue
+from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.model import LinearModel, MuscleModel
+from hysteresis_ros.operators import Preisach
+
+GEOMETRY = BicepGeometry(
+    clamp_distance=0.017, clamp_height=0.006, anchor_height=0.2655, forearm_length=0.30,
+    resting_length=0.27, payload_mass=0.100, forearm_mass=0.040)
+
+# An effect of each kind with values in its range, as it would show in an arm run.
+STRENGTHS = {
+    'supply_sag': {'Rs': 0.4}, 'pwm_dead_zone': {'Vd': 0.4}, 'resistance_change': {'eta': 0.1},
+    'airflow': {'beta': 1.2}, 'thermal_lag': {'time_constant': 3.0},
+    'heating_cooling_asymmetry': {'time_constant': 3.0, 'ratio': 1.5},
+    'latent_heat': {'time_constant': 3.0, 'latent': 0.2},
+    'ambient_temperature': {'gain': 0.3, 'reference': 25.0},
+    'ambient_drift': {'offset': 0.5, 'rate': 1.0, 'curvature': -0.3},
+    'stress_dependence': {'shift': 0.15}, 'stress_dependent_strain': {'r': 0.5, 'F0': 1.2},
+    'series_compliance': {'compliance': 0.05},
+    'r_phase': {'strain': 0.2, 'position': 0.2, 'width': 0.05},
+    'creep': {'c': 0.1, 't0': 3.0}, 'fatigue': {'b': 0.05, 'a': 0.02}, 'slack': {'Ls': 0.5},
+    'unequal_muscles': {'shorter': 0.6, 'longer': 0.9}, 'coulomb_friction': {'tau_c': 0.02},
+    'viscous_friction': {'b': 0.5}, 'inertia': {'I': 0.01}, 'frame_tilt': {'phi': 4.0},
+    'payload_error': {'dm': 15.0}, 'clamp_mass': {'moment': 0.6, 'phi': 0.4},
+    'geometry_error': {'dx': 0.6, 'da': -0.4, 'dz': 0.3},
+    'end_stop': {'stop': 1.9, 'side': 1.0, 'stiffness': 5.0},
+    'encoder_offset': {'offset': 2.0}, 'backlash': {'B': 2.0}, 'latency': {'delay': 0.35},
+}
+
+
+def preisach(lower, upper, levels, lowest, highest, width):
+    """Operator with weights near the line alpha - beta = width and an output range."""
+    nodes = np.linspace(lower, upper, levels + 1)
+    middle = 0.5 * (nodes[1:] + nodes[:-1])
+    weights = np.array([
+        0.02 + math.exp(-((middle[a] - middle[b] - width) / (0.15 * (upper - lower))) ** 2
+                        - (((middle[a] + middle[b]) / 2 - nodes.mean())
+                           / (0.35 * (upper - lower))) ** 2)
+        for b in range(levels) for a in range(b, levels)])
+    low, high = Preisach(nodes, weights, 0.0).output_range
+    weights *= (highest - lowest) / (high - low)
+    low, high = Preisach(nodes, weights, 0.0).output_range
+    return Preisach(nodes, weights, lowest - low)
+
+
+def bicep_model(effects=(), **changes):
+    """Return a model whose arm goes from about 60 to 115 degrees."""
+    model = MuscleModel(
+        kind='two-stage', drive='voltage', load_name='force', response='length',
+        force_stage=preisach(0.0, 6.0, 6, 0.5, 14.5, 0.5),
+        length_stage=preisach(-13.0, 9.0, 10, -0.0205, 0.0005, 4.0),
+        linear=LinearModel(2.5, 1.1e-3, 0.5), geometry=GEOMETRY,
+        ranges={'voltage': (0.0, 6.0), 'length': (-0.0205, 0.0), 'force': (0.5, 14.5)},
+        mean_load=3.0, metrics={'length': {'verification': {'rmse': 0.0004}}},
+        provenance={'files': [{'name': 'length.csv', 'sha256': '00'}]})
+    for name, value in changes.items():
+        setattr(model, name, value)
+    return model.with_effects([effect_of(model, name) for name in effects])
+
+
+def effect_of(model, name, **values):
+    """Return an effect of the catalogue with its values of `STRENGTHS`, or others."""
+    return catalogue()[name](model.surroundings, **(values or STRENGTHS[name]))
+
+
+def arm_run(voltage, step=30.0, first=None, **columns):
+    """Return an arm run of one trial with rows `step` seconds apart."""
+    voltage = np.asarray(voltage, dtype=float)
+    time = step * np.arange(len(voltage)) + (step if first is None else first)
+    return Measurement.from_columns({
+        'time': time, 'trial': np.zeros(len(voltage)), 'voltage': voltage,
+        'angle': np.full(len(voltage), 1.5), **columns})
+
+
+def wandering_voltage(rows, seed=0):
+    """Return a smooth random voltage from 0 to 6 V with reversals of all sizes."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(rows)
+    waves = sum(math.sin(phase) + np.sin(2 * math.pi * time / period + phase)
+                for period, phase in zip(rng.uniform(40, 400, 5), rng.uniform(0, 6.28, 5)))
+    return 6.0 * (waves - waves.min()) / np.ptp(waves)

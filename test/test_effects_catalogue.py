@@ -1,0 +1,344 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The catalogue: what it lists, what each effect says of itself, and what a user adds to it."""
+
+from importlib import metadata
+import math
+import types
+
+import numpy as np
+import pytest
+
+from hysteresis_ros.effects import (
+    catalogue, DriveEffect, Effect, effect_class, Inputs, MaterialEffect, Parameter, SensorEffect,
+    STAGES)
+from hysteresis_ros.effects.catalogue import ENTRY_POINT_GROUP
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.model import Simulator
+from model_support import arm_run, bicep_model, effect_of, STRENGTHS, wandering_voltage
+
+# Stage, a word of what it shows in, a word of what excites it, and what it is confused with.
+EXPECTED = {
+    'supply_sag': ('electrical', 'V', 'at the wire', {'airflow'}),
+    'pwm_dead_zone': ('electrical', 'low V', 'fine steps', {'ambient_drift'}),
+    'resistance_change': ('electrical', 'middle of the loop', 'current', {'stress_dependence'}),
+    'thermal_lag': ('thermal', 'time since a step', 'several rates',
+                    {'latency', 'viscous_friction', 'creep'}),
+    'heating_cooling_asymmetry': ('thermal', 'sign of dV/dt', 'up and down', {'thermal_lag'}),
+    'latent_heat': ('thermal', 'inside the loop', 'small steps', {'thermal_lag'}),
+    'ambient_temperature': ('thermal', 'ambient', 'log the ambient', {'ambient_drift'}),
+    'ambient_drift': ('thermal', 'time of day', 'repeat the same loop', {'fatigue', 'creep'}),
+    'airflow': ('thermal', 'time constant', 'fan', {'supply_sag'}),
+    'stress_dependence': ('material', 'load at the same', 'three or more loads',
+                          {'supply_sag', 'series_compliance'}),
+    'stress_dependent_strain': ('material', 'cold side', 'three or more loads',
+                                {'series_compliance'}),
+    'r_phase': ('material', 'shoulder on cooling', 'staircase', {'slack'}),
+    'creep': ('material', 'log time', '300 s', {'thermal_lag', 'ambient_drift'}),
+    'fatigue': ('material', 'cycle count', 'reference loop', {'ambient_drift'}),
+    'slack': ('material', 'low force', 'preload', {'r_phase', 'geometry_error'}),
+    'series_compliance': ('material', 'force', 'weights', {'payload_error', 'geometry_error'}),
+    'unequal_muscles': ('material', 'smeared knees', 'one muscle at a time',
+                        {'slack', 'geometry_error'}),
+    'coulomb_friction': ('mechanism', 'reversals', 'tap', {'backlash'}),
+    'viscous_friction': ('mechanism', 'dtheta/dt', 'swing', {'thermal_lag', 'latency'}),
+    'inertia': ('mechanism', 'ringing', 'pluck', {'viscous_friction'}),
+    'payload_error': ('mechanism', 'gravity curve', 'scale', {'frame_tilt', 'supply_sag'}),
+    'clamp_mass': ('mechanism', 'theta', 'without a payload', {'geometry_error'}),
+    'geometry_error': ('mechanism', 'smooth in theta', 'calliper',
+                       {'series_compliance', 'encoder_offset'}),
+    'frame_tilt': ('mechanism', 'cos theta', 'spirit level', {'payload_error', 'encoder_offset'}),
+    'end_stop': ('mechanism', 'one end of theta', 'into the stop', {'slack'}),
+    'encoder_offset': ('sensor', 'constant', 'hard stop', {'geometry_error'}),
+    'backlash': ('sensor', 'reversals', 'by hand', {'coulomb_friction'}),
+    'latency': ('sensor', 'dtheta/dt', 'chirp', {'thermal_lag'}),
+}
+
+# Effect, parameter: unit and plausible range for a 0.2 mm wire on this arm.
+RANGES = {
+    ('supply_sag', 'Rs'): ('Ohm', 0.05, 2.0), ('pwm_dead_zone', 'Vd'): ('V', 0.05, 1.5),
+    ('thermal_lag', 'time_constant'): ('s', 1.0, 10.0),
+    ('heating_cooling_asymmetry', 'ratio'): ('1', 0.5, 2.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
+    ('creep', 'c'): ('% of l0', 0.01, 0.5), ('slack', 'Ls'): ('mm', 0.1, 5.0),
+    ('series_compliance', 'compliance'): ('mm/N', 1.0 / 200.0, 1.0 / 2.0),
+    ('coulomb_friction', 'tau_c'): ('N m', 0.001, 0.150),
+    ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 5., 100.),
+    ('clamp_mass', 'moment'): ('g m', 5.0 * 0.020, 30.0 * 0.050),
+    ('geometry_error', 'dx'): ('mm', 0.5, 5.0), ('frame_tilt', 'phi'): ('deg', 1.0, 25.0),
+    ('encoder_offset', 'offset'): ('deg', 0.2, 15.0), ('backlash', 'B'): ('deg', 0.2, 12.0),
+    ('latency', 'delay'): ('s', 0.005, 5.0),
+}
+
+
+def test_catalogue_holds_every_effect_in_the_order_of_the_stages():
+    assert set(catalogue()) == set(EXPECTED)
+    stages = [STAGES.index(effect.stage) for effect in catalogue().values()]
+    assert stages == sorted(stages)
+
+
+@pytest.mark.parametrize('name', EXPECTED)
+def test_effect_says_what_it_is(name):
+    stage, shows_in, experiment, confused_with = EXPECTED[name]
+    effect = catalogue()[name]
+    assert effect.stage == stage
+    assert shows_in in effect.shows_in
+    assert experiment in effect.experiment
+    assert set(effect.confused_with) == confused_with
+    assert effect.sentence.endswith('.') and effect.equation and effect.source
+
+
+@pytest.mark.parametrize('effect, name', RANGES)
+def test_parameter_has_its_unit_and_plausible_range(effect, name):
+    model = bicep_model()
+    parameter = {p.name: p for p in effect_of(model, effect).parameters}[name]
+    unit, low, high = RANGES[effect, name]
+    assert (parameter.unit, parameter.low, parameter.high) == (
+        unit, pytest.approx(low), pytest.approx(high))
+    assert parameter.plausible(low * 1.01) and parameter.plausible(high * 0.99)
+    assert not parameter.plausible(high * 1.01) and not parameter.plausible(low * 0.99)
+    assert parameter.plausible(-high * 0.99) == parameter.both_signs
+
+
+@pytest.mark.parametrize('name', EXPECTED)
+def test_starts_and_neutral_value_lie_within_the_bounds_of_a_fit(name):
+    for parameter in effect_of(bicep_model(), name).parameters:
+        low, high = parameter.bounds
+        assert low < high and parameter.description
+        for start in parameter.starts:
+            assert low <= start <= high
+        if not parameter.log and not parameter.choices:
+            assert low <= parameter.neutral <= high
+
+
+@pytest.mark.parametrize('name', EXPECTED)
+def test_neutral_values_are_no_effect_at_all(name):
+    model = bicep_model()
+    voltage = wandering_voltage(60)
+    for run in (arm_run(voltage, 0.1, ambient_temperature=np.full(60, 30.0)),
+                arm_run(voltage, 30.0)):
+        neutral = catalogue()[name](model.surroundings)
+        np.testing.assert_array_equal(
+            Simulator(model, run).run([neutral]), Simulator(model, run).run([]))
+
+
+@pytest.mark.parametrize('name', EXPECTED)
+def test_every_effect_changes_what_an_arm_run_shows(name):
+    model = bicep_model()
+    run = arm_run(np.tile(wandering_voltage(60), 2), 0.5,
+                  ambient_temperature=np.linspace(20.0, 30.0, 120))
+    simulator = Simulator(model, run)
+    change = simulator.run([effect_of(model, name)]) - simulator.run([])
+    assert np.all(np.isfinite(change))
+    assert np.max(np.abs(change)) > math.radians(0.01)
+
+
+def test_implausible_values_are_named_but_neutral_ones_are_not():
+    model = bicep_model()
+    assert effect_of(model, 'fatigue', a=0.4).implausible() == ['a']
+    assert effect_of(model, 'fatigue', a=-0.1).implausible() == ['a']
+    assert effect_of(model, 'encoder_offset', offset=-3.0).implausible() == []
+    assert effect_of(model, 'end_stop', stop=1.0, side=0.5, stiffness=1.0).implausible() == ['side']
+
+
+def test_values_are_read_as_attributes_and_changed_in_a_copy():
+    model = bicep_model()
+    effect = effect_of(model, 'clamp_mass')
+    effect.intervals = {'phi': (0.1, 0.7)}
+    other = effect.with_values(phi=1.0)
+    assert (other.moment, other.phi, effect.phi) == (0.6, 1.0, 0.4)
+    assert other.intervals == {}
+    with pytest.raises(AttributeError, match='no attribute'):
+        effect.mass
+
+
+@pytest.mark.parametrize('values, message', [
+    ({'mass': 1.0}, "no parameter 'mass'; it has moment, phi"),
+    ({'phi': math.nan}, 'phi must be finite')])
+def test_wrong_values_are_refused(values, message):
+    with pytest.raises(ParameterError, match=message):
+        effect_class('clamp_mass')(**values)
+
+
+def test_unknown_effect_is_refused_with_the_list_of_those_there_are():
+    with pytest.raises(ParameterError, match="no effect 'gremlins'; there are supply_sag, pwm"):
+        effect_class('gremlins')
+
+
+def test_what_makes_no_sense_for_a_muscle_is_not_available():
+    effects = catalogue()
+    current = bicep_model(drive='current').surroundings
+    assert not effects['supply_sag'].available(current)
+    assert effects['resistance_change'].available(current)
+    assert not effects['resistance_change'].available(current._replace(drive='pressure'))
+    unloaded = bicep_model(mean_load=0.0, load_name=None).surroundings
+    for name in ('stress_dependence', 'stress_dependent_strain', 'series_compliance'):
+        assert effects[name].available(current) and not effects[name].available(unloaded)
+    for effect in effects.values():
+        effect(unloaded)
+
+
+class Hum(DriveEffect):
+    """A user's own effect: a hum of the supply."""
+
+    id = 'hum'
+    stage = 'electrical'
+    sentence = 'The supply adds a constant voltage.'
+    equation = 'Ve = V + u'
+    source = 'a user'
+    shows_in = 'V'
+    experiment = 'another supply'
+    parameters = (Parameter('u', 'V', 'what is added', 0.1, 1.0, 0.0, (0.2,)),)
+
+    def forward(self, signal, inputs, surroundings):
+        """Add it."""
+        return signal + self.u
+
+    def inverse(self, signal, inputs, surroundings):
+        """Take it off."""
+        return signal - self.u
+
+
+class Drag(SensorEffect):
+    """A user's effect with a past, defined by `step` alone."""
+
+    id = 'drag'
+    stage = 'sensor'
+    sentence = equation = source = shows_in = experiment = 'The pointer follows half way.'
+    parameters = (Parameter('share', '1', 'of the way', 0.1, 1.0, 0.0, (0.5,)),)
+    memory = ('_last',)
+
+    def start(self):
+        """Forget."""
+        self._last = None
+
+    def step(self, value, step):
+        """Follow."""
+        last = value if self._last is None else self._last
+        self._last = value + self.share * (last - value)
+        return self._last
+
+
+class Swelling(MaterialEffect):
+    """A user's effect of the material, defined by `drift` alone."""
+
+    id = 'swelling'
+    sentence = equation = source = shows_in = experiment = 'It gets longer with time.'
+    parameters = (Parameter('rate', 'm/s', 'growth', 1e-6, 1e-3, 0.0, (1e-5,)),)
+
+    def drift(self, drive, heat, inputs, surroundings):
+        """Grow."""
+        return self.rate * inputs.time, np.ones(len(drive))
+
+
+@pytest.fixture
+def install(monkeypatch):
+    """Return a function that makes classes look like installed entry points."""
+    def install(*effects):
+        entries = [types.SimpleNamespace(
+            name=getattr(effect, 'id', 'x'), value='user:Effect', load=lambda effect=effect: effect)
+            for effect in effects]
+        plain = metadata.entry_points
+        monkeypatch.setattr(metadata, 'entry_points', lambda **group: (
+            entries if group == {'group': ENTRY_POINT_GROUP} else plain(**group)))
+        catalogue.cache_clear()
+    yield install
+    monkeypatch.undo()
+    catalogue.cache_clear()
+
+
+def test_a_users_effect_takes_part_everywhere(install, tmp_path):
+    install(Hum, Drag, Swelling)
+    names = list(catalogue())
+    assert names.index('resistance_change') < names.index('hum') < names.index('thermal_lag')
+    assert effect_class('hum') is Hum
+
+    voltage = wandering_voltage(40)
+    model = bicep_model()
+    model = model.with_effects([Drag(share=0.5), Hum(u=0.3), Swelling(rate=1e-5)])
+    plain = bicep_model().predict(arm_run(voltage + 0.3, 1.0))
+    hummed = Simulator(model, arm_run(voltage, 1.0)).run([Hum(u=0.3)])
+    np.testing.assert_array_equal(hummed, plain)
+
+    model.save(tmp_path / 'model.yaml')
+    loaded = type(model).load(tmp_path / 'model.yaml')
+    run = arm_run(voltage, 1.0)
+    predicted = loaded.predict(run)
+    np.testing.assert_array_equal(predicted, model.predict(run))
+    observer = loaded.observer()
+    observer.reset(0.0)
+    np.testing.assert_allclose(
+        [observer.step(t, v) for t, v in zip(run.time, voltage)], predicted, atol=1e-12)
+
+    controller = model.with_effects([Hum(u=0.3)]).controller()
+    reference = controller.reference(1.5)
+    without = bicep_model().controller()
+    assert controller.setpoint(*reference).voltage == pytest.approx(
+        without.setpoint(*without.reference(1.5)).voltage - 0.3, abs=1e-12)
+
+
+class Nameless(DriveEffect):
+    """Says nothing."""
+
+    stage = 'thermal'
+
+
+class Idle(Hum):
+    """Does nothing."""
+
+    id = 'idle'
+    forward = DriveEffect.forward
+
+
+def variant(base, **attributes):
+    """Return a changed copy of a class."""
+    return type('Variant', (base,), attributes)
+
+
+@pytest.mark.parametrize('effect, message', [
+    (Nameless, 'Nameless lacks id, sentence, equation, source, shows_in, experiment'),
+    (Idle, 'idle defines neither forward nor step'),
+    (variant(Hum, stage='spiritual'), "stage 'spiritual' is none of electrical"),
+    (variant(Hum, stage='material'), 'has to be a MaterialEffect'),
+    (variant(Hum, id='slack'), "two effects are called 'slack'"),
+    (Effect, 'lacks id'),
+    (dict, 'no subclass of hysteresis_ros.effects.Effect')])
+def test_a_users_effect_that_cannot_work_is_refused_in_one_line(install, effect, message):
+    install(effect)
+    with pytest.raises(ParameterError, match=message) as error:
+        catalogue()
+    assert '\n' not in str(error.value)
+
+
+def test_an_effect_that_cannot_be_loaded_is_named(monkeypatch):
+    def load():
+        raise ImportError('no module named wire')
+    entry = types.SimpleNamespace(name='wire', value='wire:Wire', load=load)
+    monkeypatch.setattr(metadata, 'entry_points', lambda group: [entry])
+    catalogue.cache_clear()
+    with pytest.raises(ParameterError, match="'wire' of entry point 'wire:Wire' cannot be loaded"):
+        catalogue()
+    monkeypatch.undo()
+    catalogue.cache_clear()
+
+
+def test_defaults_of_the_stages_do_nothing():
+    surroundings = bicep_model().surroundings
+    inputs = Inputs(np.arange(3.0), np.arange(3.0), np.ones(3), np.full(3, np.nan), np.ones(3),
+                    np.zeros(3))
+    material = MaterialEffect()
+    offset, factor = material.drift(np.ones(3), np.ones(3), inputs, surroundings)
+    assert offset.tolist() == [0.0] * 3 and factor.tolist() == [1.0] * 3
+    assert material.advance(1.0, 1.0, inputs, surroundings) == (0.0, 1.0)
+    assert (material.shift_load(2.0, surroundings), material.scale(2.0, surroundings),
+            material.stretch(2.0, surroundings)) == (0.0, 1.0, 0.0)
+    sensor = SensorEffect()
+    assert sensor.step(3.0, 0.1) == sensor.inverse(3.0) == 3.0
+    assert sensor.forward(np.ones(3), inputs).tolist() == [1.0] * 3
+    assert Hum(u=0.5).step(1.0, 0.1, 1.0, surroundings) == 1.5
+    assert DriveEffect().inverse(2.0, inputs, surroundings) == 2.0
+
+
+def test_strengths_of_these_tests_are_plausible():
+    model = bicep_model()
+    assert set(STRENGTHS) == set(catalogue())
+    assert not [name for name in STRENGTHS if effect_of(model, name).implausible()]

@@ -1,0 +1,246 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects of the material: what load, time and use do to ``L = H2[s (x - c F)]``."""
+
+import math
+
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+
+from hysteresis_ros.effects import catalogue, Inputs, Surroundings
+from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.model.chain import Chain
+from model_support import bicep_model, effect_of, STRENGTHS
+
+WIRE = Surroundings(0.27, 3.0, 36.0, 0.02, drive_range=6.0)
+LOADS = np.array([0.0, 1.5, 3.0, 9.0])
+DRIFTS = ('r_phase', 'creep', 'fatigue')
+
+
+def effect(name, surroundings=WIRE, **values):
+    return catalogue()[name](surroundings, **values)
+
+
+def inputs(time, cycles=None):
+    """Rows of one trial at these times."""
+    time = np.asarray(time, dtype=float)
+    none = np.full(len(time), np.nan)
+    return Inputs(time, time, np.diff(time, prepend=0.0), none, none,
+                  np.zeros(len(time)) if cycles is None else np.asarray(cycles, dtype=float))
+
+
+def test_stress_dependence_weighs_the_load_more_about_the_bench_mean():
+    made = effect('stress_dependence', shift=0.2)
+    np.testing.assert_allclose(LOADS + made.shift_load(LOADS, WIRE), 1.2 * LOADS - 0.6)
+
+
+@pytest.mark.parametrize('drive, load, unit, low, high, per_heat', [
+    ('voltage', 'force', 'N/V^2', 0.2, 6.0, 2.0), ('current', 'force', 'N/A^2', 1.0, 1e3, 2.0),
+    ('temperature', 'stress', 'MPa/K', 5.0, 15.0, 2e6),
+    ('temperature', 'force', 'N/K', 0.01, 100.0, 2.0),
+    ('pressure', 'force', 'load/heat', 1e-3 / 12, 1e3 / 12, 2.0)])
+def test_clausius_clapeyron_has_the_units_of_the_table(drive, load, unit, low, high, per_heat):
+    made = effect('stress_dependence', WIRE._replace(drive=drive, load_name=load), C=2.0)
+    parameter = made.parameters[0]
+    assert (parameter.unit, parameter.low, parameter.high) == (
+        unit, pytest.approx(low), pytest.approx(high))
+    assert made.load_per_heat == per_heat
+    assert parameter.kinds == ('bench',)
+    assert effect('stress_dependence', shift=0.5).load_per_heat == 0.0
+
+
+def test_range_of_clausius_clapeyron_covers_the_wire():
+    # 5 to 15 MPa/K on a 0.203 mm wire, whose heat is 2 to 12 K/V^2.
+    area = math.pi / 4.0 * 0.203e-3 ** 2
+    parameter = effect('stress_dependence').parameters[0]
+    assert parameter.low < 5e6 * area * 2.0 < 15e6 * area * 12.0 < parameter.high * 1.01
+
+
+def test_transformation_strain_grows_with_the_load_and_saturates():
+    made = effect('stress_dependent_strain', r=0.6, F0=1.5)
+    expected = [(1.0 - 0.6 * math.exp(-load / 4.5)) / (1.0 - 0.6 * math.exp(-1.0 / 1.5))
+                for load in LOADS]
+    np.testing.assert_allclose(made.scale(LOADS, WIRE), expected)
+    assert made.scale(3.0, WIRE) == pytest.approx(1.0)
+    assert np.all(np.diff(made.scale(LOADS, WIRE)) > 0.0)
+
+
+@given(st.floats(-0.5, 1.5), st.floats(0.02, 15.0), st.floats(0.0, 1e3))
+def test_stroke_never_vanishes_within_the_bounds_of_a_fit(r, scale, load):
+    value = effect('stress_dependent_strain', r=r, F0=scale).scale(np.float64(load), WIRE)
+    assert 0.0 < value < 1e3
+
+
+@pytest.mark.parametrize('response, load, unit, factor', [
+    ('length', 'force', 'mm/N', 1e-3), ('strain', 'stress', '1/GPa', 1e-9),
+    ('strain', 'force', '%/N', 1e-2), ('length', 'stress', 'mm/MPa', 1e-9)])
+def test_compliance_stretches_in_proportion_to_the_load(response, load, unit, factor):
+    surroundings = WIRE._replace(response=response, load_name=load)
+    made = effect('series_compliance', surroundings, compliance=0.1)
+    assert made.parameters[0].unit == unit
+    np.testing.assert_allclose(made.stretch(LOADS, surroundings), 0.1 * factor * (LOADS - 3.0))
+
+
+def test_compliance_is_the_same_wire_in_every_unit():
+    length, area = 0.27, math.pi / 4.0 * 0.203e-3 ** 2
+    limits = {}
+    for response, load in (('length', 'force'), ('strain', 'force'), ('length', 'stress')):
+        made = effect('series_compliance', WIRE._replace(response=response, load_name=load))
+        parameter = made.parameters[0]
+        per = made.UNITS[parameter.unit]
+        per *= length if response == 'strain' else 1.0
+        per /= area if load == 'stress' else 1.0
+        limits[response, load] = np.array([parameter.low, parameter.high]) * per
+    for limit in limits.values():
+        np.testing.assert_allclose(limit, limits['length', 'force'], rtol=0.35)
+    modulus = effect('series_compliance', WIRE._replace(
+        response='strain', load_name='stress')).parameters[0]
+    assert modulus.plausible(1.0 / 20.0) and modulus.plausible(1.0 / 80.0)
+
+
+def test_slack_is_the_same_under_any_load():
+    np.testing.assert_array_equal(effect('slack', Ls=1.5).stretch(LOADS, WIRE), 1.5e-3)
+
+
+def test_fatigue_drifts_and_shrinks_with_the_logarithm_of_the_cycles():
+    offset, factor = effect('fatigue', b=0.2, a=0.1).drift(
+        np.zeros(3), np.zeros(3), inputs([1, 2, 3], [0.0, 1.0, 9.0]), WIRE)
+    np.testing.assert_allclose(offset, -0.002 * 0.27 * np.log([1.0, 2.0, 10.0]))
+    np.testing.assert_allclose(factor, 1.0 - 0.1 * np.log([1.0, 2.0, 10.0]))
+
+
+def logistic(x):
+    return 1.0 / (1.0 + math.exp(-x))
+
+
+def test_r_phase_is_a_step_with_a_narrow_loop():
+    made = effect('r_phase', strain=0.5, position=0.3, width=0.05)
+    heat = np.array([0.0, 12.0, 36.0, 12.0, 0.0])
+    offset, factor = made.drift(np.sqrt(heat), heat, inputs(range(5)), WIRE)
+    half = 0.5 * 0.03 * 36.0
+    # The play lags behind the heat by half the loop's width, on both ways.
+    played = [0.0, 12.0 - half, 36.0 - half, 12.0 + half, half]
+    expected = [-0.005 * 0.27 * logistic((q / 36.0 - 0.3) / 0.05) for q in played]
+    np.testing.assert_allclose(offset, expected, rtol=1e-12)
+    assert np.all(factor == 1.0)
+    assert offset[3] < offset[1]
+
+
+def test_creep_goes_on_with_the_logarithm_of_time_in_the_direction_of_the_step():
+    made = effect('creep', c=0.1, t0=2.0)
+    volts = np.array([3.0, 3.0, 3.0, 1.0, 1.0])
+    offset, factor = made.drift(volts, volts ** 2, inputs([1.0, 2.0, 7.0, 8.0, 12.0]), WIRE)
+    unit = 0.001 * 0.27
+    expected = [0.0, -unit * 0.5 * math.log1p(1.0 / 2.0), -unit * 0.5 * math.log1p(6.0 / 2.0),
+                0.0, unit * (2.0 / 6.0) * math.log1p(4.0 / 2.0)]
+    np.testing.assert_allclose(offset, expected, atol=1e-18)
+    assert np.all(factor == 1.0)
+
+
+def test_a_ramp_of_small_steps_creeps_like_its_whole():
+    made = effect('creep', c=0.1, t0=2.0)
+    volts = np.array([0.5, 1.0, 1.5, 2.0, 2.0])
+    offset, _ = made.drift(volts, volts ** 2, inputs([1, 2, 3, 4, 9]), WIRE)
+    assert offset[-1] == pytest.approx(-0.001 * 0.27 * (2.0 / 6.0) * math.log1p(5.0 / 2.0))
+
+
+def test_nothing_creeps_before_the_first_step():
+    offset, _ = effect('creep', c=0.1).drift(np.zeros(3), np.zeros(3), inputs([1, 9, 99]), WIRE)
+    assert np.all(offset == 0.0)
+
+
+@pytest.mark.parametrize('name', ['creep', 'r_phase'])
+def test_a_muscle_that_extends_goes_the_other_way(name):
+    volts = np.array([4.0, 4.0, 1.0, 1.0])
+    contracts, extends = (
+        effect(name, WIRE._replace(sign=sign), **STRENGTHS[name]).drift(
+            volts, volts ** 2, inputs([1, 5, 6, 20]), WIRE._replace(sign=sign))[0]
+        for sign in (-1, 1))
+    np.testing.assert_allclose(extends, -contracts)
+    assert contracts[1] < 0.0
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 6.0), st.floats(0.1, 50.0), st.booleans()),
+                min_size=1, max_size=12), st.sampled_from(DRIFTS))
+def test_row_by_row_is_the_same_as_the_whole_trial(rows, name):
+    volts, steps = [0.0], []
+    for value, step, held in rows:
+        volts.append(volts[-1] if held else value)
+        steps.append(step)
+    volts = np.array(volts[1:])
+    trial = inputs(np.cumsum(steps), np.cumsum(np.abs(np.diff(volts, prepend=0.0))) / 12.0)
+    made = effect(name, **STRENGTHS[name])
+    offset, factor = made.drift(volts, volts ** 2, trial, WIRE)
+    made.start()
+    for n, value in enumerate(volts.tolist()):
+        row = Inputs(*(float(column[n]) for column in trial))
+        np.testing.assert_allclose(made.advance(value, value ** 2, row, WIRE),
+                                   (offset[n], factor[n]), rtol=1e-12, atol=1e-15)
+        made.restore(made.save())
+
+
+@pytest.mark.parametrize('name', [*DRIFTS, 'slack'])
+def test_chain_knows_what_drifts(name):
+    assert Chain([effect(name, **STRENGTHS[name])], WIRE).drifts == (name != 'slack')
+
+
+def test_effects_of_the_load_add_up_and_strokes_multiply():
+    chain = Chain([effect('stress_dependence', shift=0.1),
+                   effect('stress_dependent_strain', r=0.6, F0=1.5),
+                   effect('series_compliance', compliance=0.1), effect('slack', Ls=1.0)], WIRE)
+    np.testing.assert_allclose(chain.load_inside(LOADS), 1.1 * LOADS - 0.3)
+    np.testing.assert_allclose(chain.stretch(LOADS), 1e-3 + 1e-4 * (LOADS - 3.0))
+    np.testing.assert_allclose(
+        chain.scale(LOADS), effect('stress_dependent_strain', r=0.6, F0=1.5).scale(LOADS, WIRE))
+    assert chain.load_per_heat() == 0.0
+    assert chain.offsets == (0.0,)
+
+
+def test_unequal_muscles_have_a_longer_and_a_shorter_one():
+    made = effect('unequal_muscles', shorter=2.0, longer=3.0)
+    assert made.offsets == pytest.approx((-2e-3, 0.0, 3e-3))
+    assert Chain([made], WIRE).offsets == made.offsets
+
+
+def bench(voltage, force):
+    """A length table of one trial."""
+    count = len(voltage)
+    return Measurement.from_columns({
+        'trial': np.zeros(count), 'step': np.arange(count), 'voltage': np.asarray(voltage),
+        'force': np.full(count, force), 'length': np.zeros(count)})
+
+
+def test_length_table_follows_the_relation_of_the_material():
+    model = bicep_model()
+    effects = [effect_of(model, name) for name in (
+        'stress_dependence', 'stress_dependent_strain', 'series_compliance', 'slack', 'fatigue')]
+    voltage, force = np.array([1.0, 4.0, 2.0, 5.0, 0.0]), 4.0
+    predicted = model.with_effects(effects).predict(bench(voltage, force))
+
+    first, stage = model.force_stage, model.require_length_stage()
+    first.reset()
+    stage.reset()
+    inside = force + 0.15 * (force - 3.0)
+    stage.step(inside - first.step(0.0))
+    base = stage.output_range[0]
+    share = ((1.0 - 0.5 * math.exp(-force / 3.6)) / (1.0 - 0.5 * math.exp(-1.0 / 1.2)))
+    travel, before = 0.0, 0.0
+    for n, value in enumerate(voltage):
+        travel, before = travel + abs(value - before), value
+        worn = math.log1p(travel / 12.0)
+        length = (base + share * (1.0 - 0.02 * worn)
+                  * (stage.step(inside - first.step(value)) - base)
+                  + 0.05e-3 * (force - 3.0) + 0.5e-3 - 0.0005 * 0.27 * worn)
+        assert predicted[n] == pytest.approx(length, abs=1e-12)
+
+
+def test_clausius_clapeyron_takes_the_place_of_the_first_stage():
+    model = bicep_model()
+    voltage = np.array([1.0, 4.0, 2.0])
+    predicted = model.with_effects(
+        [effect_of(model, 'stress_dependence', C=0.4)]).predict(bench(voltage, 4.0))
+    stage = model.require_length_stage()
+    stage.step(4.0)
+    np.testing.assert_allclose(
+        predicted, [stage.step(4.0 - 0.4 * value ** 2) for value in voltage], atol=1e-15)

@@ -1,0 +1,77 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects of the sensor: equations, memory, and the targets that undo them."""
+
+import math
+
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+
+from hysteresis_ros.effects import catalogue, Inputs
+from model_support import STRENGTHS
+
+angles = st.lists(st.floats(0.5, 2.5), min_size=1, max_size=20)
+
+
+def effect(name, **values):
+    return catalogue()[name](**(values or STRENGTHS[name]))
+
+
+def rows(steps):
+    time = np.cumsum(steps)
+    return Inputs(time, time, np.asarray(steps, dtype=float), *(np.full(len(time), np.nan),) * 3)
+
+
+def test_encoder_offset_adds_degrees():
+    made = effect('encoder_offset', offset=3.0)
+    np.testing.assert_allclose(
+        made.forward(np.array([1.0, 2.0]), None), np.array([1.0, 2.0]) + math.radians(3.0))
+    assert made.step(1.0, 0.1) == pytest.approx(1.0 + math.radians(3.0))
+    assert made.inverse(made.step(1.2, 0.1)) == pytest.approx(1.2, abs=1e-15)
+
+
+def test_backlash_stands_still_until_the_play_is_used_up():
+    degrees = np.array([10.0, 10.5, 12.0, 11.5, 10.0, 7.0, 8.9, 9.5])
+    seen = effect('backlash', B=2.0).forward(np.radians(degrees), rows(np.ones(8)))
+    np.testing.assert_allclose(np.degrees(seen), [10.0, 10.0, 11.0, 11.0, 11.0, 8.0, 8.0, 8.5])
+
+
+@given(angles)
+def test_backlash_reaches_every_target_once_the_first_is_passed(targets):
+    sensor, controller = effect('backlash', B=2.0), effect('backlash', B=2.0)
+    sensor.step(targets[0], 0.0)
+    controller.inverse(targets[0])
+    for target in targets[1:]:
+        assert sensor.step(controller.inverse(target), 0.0) == pytest.approx(target, abs=1e-12)
+
+
+def test_latency_gives_what_was_a_moment_ago():
+    seen = effect('latency', delay=0.25).forward(
+        np.array([1.0, 2.0, 4.0, 4.0]), rows([0.1, 0.2, 0.2, 0.2]))
+    np.testing.assert_allclose(seen, [1.0, 1.0, 1.75, 3.5])
+
+
+@given(st.lists(st.tuples(st.floats(0.5, 2.5), st.floats(0.01, 1.0)), min_size=1, max_size=20),
+       st.sampled_from(['encoder_offset', 'backlash', 'latency']))
+def test_row_by_row_is_the_same_as_the_whole_trial(samples, name):
+    made = effect(name)
+    response, steps = np.array(samples).T
+    whole = made.forward(response, rows(steps))
+    made.start()
+    single = []
+    for value, step in samples:
+        single.append(made.step(value, step))
+        made.restore(made.save())
+    np.testing.assert_allclose(single, whole, atol=1e-12)
+
+
+def test_start_forgets_the_past():
+    for name in ('backlash', 'latency'):
+        made = effect(name)
+        fresh = made.save()
+        made.step(1.0, 0.1)
+        made.step(2.0, 0.1)
+        assert made.save() != fresh
+        made.start()
+        assert made.save() == fresh
