@@ -80,7 +80,7 @@ class Muscle:
 
 def offline(angles, limits=(0.0, 6.0), model=None):
     """Return the voltages of the inverse model without ROS."""
-    controller = (model or small_model()).controller(voltage_limits=limits)
+    controller = (model or small_model()).controller(voltage_limits=limits, arm=True)
     return [controller.setpoint(*GEOMETRY_OF_TESTS.reference(angle)).voltage for angle in angles]
 
 
@@ -159,7 +159,7 @@ def test_reference_out_of_reach_is_saturated_with_the_expected_error(graph):
     muscle.ask(1.2)
     assert muscle.wait(1) == [5.0]
     status = muscle.status(b'\1')
-    expected = small_model().controller(voltage_limits=(0.0, 5.0)).setpoint(
+    expected = small_model().controller(voltage_limits=(0.0, 5.0), arm=True).setpoint(
         *GEOMETRY_OF_TESTS.reference(1.2))
     assert 'out of reach within 0 to 5' in status.message
     assert f'error {1e3 * expected.error:+.3f} mm' in status.message
@@ -194,7 +194,8 @@ def test_small_reversals_are_not_followed(graph):
     muscle = Muscle(graph, dead_band=1e-3)
     angles = [1.6, 1.9, 1.899, 1.9, 1.898]
     muscle.ask(*angles)
-    controller = small_model().controller(voltage_limits=(0.0, 6.0), dead_band=1e-3)
+    controller = small_model().controller(
+        voltage_limits=(0.0, 6.0), dead_band=1e-3, arm=True)
     expected = [controller.setpoint(*GEOMETRY_OF_TESTS.reference(angle)).voltage
                 for angle in angles]
     assert muscle.wait(5) == pytest.approx(expected, abs=1e-12)

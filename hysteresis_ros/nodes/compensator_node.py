@@ -70,7 +70,7 @@ class CompensatorNode(Node):
             self, self.PARAMETERS, check=_check, changed=self._configure)
         self._model = model or load_model(
             parameters['model_file'], parameters, self.get_logger())
-        self._controller = self._model.controller()
+        self._controller = self._model.controller(arm=True)
         self._integral = AngleFeedback()
         self._timer = None
         self._ambient = math.nan
