@@ -32,7 +32,7 @@ MOST_IN_SETS = 5
 # Effects whose signatures agree more than this cannot be told apart.
 CONFUSED = 0.9
 # The base model's error on the arm may be this many times that of the bench's verification.
-STRUCTURE_MARGIN = 1.3
+STRUCTURE_MARGIN = 1.6
 # More than this share of the first mean square left over means that the cause is not known.
 UNEXPLAINED = 0.3
 MOST_ALTERNATIVES = 3
@@ -209,7 +209,8 @@ class _Diagnostician:
     def _grow(self, seed: Candidate, first):
         """Add effects to a first one while each explains more; None if it ends implausible."""
         fit = seed.fit
-        while len(fit.effects) < MOST_EFFECTS and self.fitter.error(fit.held_out) > self.floor:
+        while (len(fit.effects) < MOST_EFFECTS
+               and self.fitter.error(fit.held_out) > STRUCTURE_MARGIN * self.floor):
             known = fit.effects
             taken = {effect.id for effect in known}
             names = [name for name in self._worth_another_look(first, fit) if name not in taken]

@@ -333,6 +333,7 @@ class BridgeNode(Node):
     def _values(self):
         status = self._board.status
         values = {
+            'state': 'initialising' if self._cycle is not None else 'ready',
             'port': self._settings['port'], 'online': status.online,
             'board': status.identity.name if status.identity else 'unknown',
             'connections': status.connections, 'frames': status.frames,

@@ -1,0 +1,178 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Score the diagnosis on recordings in which a physical effect is hidden.
+
+Every case is made by the virtual laboratory: a bench, from which the model is identified, and two
+recordings of the arm. The diagnosis is given the model and the first recording as a user would
+have them; the truth is used for the score only. `make hidden` runs the whole grid.
+"""
+
+import argparse
+import functools
+import itertools
+import json
+from pathlib import Path
+import sys
+import time
+
+import joblib
+import numpy as np
+
+# Seeds above this were never looked at while thresholds were chosen.
+FIRST_SEED = 1000
+STRENGTHS = {'strong': 1.0, 'weak': 0.4}
+# Effects that only transients can show are hidden in continuous recordings, others in settled ones.
+TRANSIENT = {'thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'creep',
+             'viscous_friction', 'inertia', 'latency', 'ambient_drift', 'fatigue'}
+
+# Effects of the wire itself act on the bench, too.
+MATERIAL = {'stress_dependence', 'stress_dependent_strain', 'r_phase', 'creep', 'fatigue',
+            'latent_heat', 'resistance_change'}
+
+
+def cases(seeds, others, quick=False):
+    """Return (group, protocol, effects by strength, seed) of every case."""
+    from hysteresis_ros.laboratory.effects import hidden_effects, unlisted_effects
+
+    def protocol(names):
+        return 'arm-dynamic' if any(name in TRANSIENT for name in names) else 'arm-steps'
+
+    listed = list(hidden_effects())
+    found = []
+    for name, (group, strength) in itertools.product(listed, STRENGTHS.items()):
+        for seed in range(seeds):
+            found.append((group, protocol([name]), {name: strength}, FIRST_SEED + seed))
+    chance = np.random.default_rng(5)
+    for number in range(others):
+        seed = FIRST_SEED + 100 + number
+        kind = 'arm-dynamic' if number % 4 == 3 else 'arm-steps'
+        found.append(('none', kind, {}, seed))
+        unlisted = unlisted_effects()
+        name = unlisted[number % len(unlisted)]
+        found.append(('unknown', 'arm-dynamic' if number % 2 else 'arm-steps', {name: 1.0}, seed))
+        pair = sorted(chance.choice(listed, 2, replace=False).tolist())
+        found.append(('pair', protocol(pair), {name: 1.0 for name in pair}, seed))
+    if quick:
+        found = [case for index, case in enumerate(found) if index % 9 == 0]
+    return found
+
+
+@functools.lru_cache(maxsize=8)
+def base_model(seed, effects, material):
+    """Identify the bench of the specimen; effects of the material act there, too."""
+    from hysteresis_ros.bicep import BicepGeometry
+    from hysteresis_ros.identification.bench import identify
+    from hysteresis_ros.identification.effects import add_effects
+    from hysteresis_ros.laboratory.linkage import GEOMETRY
+    from hysteresis_ros.laboratory.protocols import protocol_tables
+    from hysteresis_ros.measurements.table import Measurement
+
+    tables = protocol_tables('bench', dict(effects), seed)
+    force, length = (Measurement.from_columns(tables[name]) for name in
+                     ('force.csv', 'length.csv'))
+    trials = {'length_trials': range(4), 'force_trials': [0]}
+    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
+    if material:
+        model, _ = add_effects(model, length, force, **trials)
+    return model
+
+
+def run(case, material):
+    """Diagnose one case and return what is scored."""
+    from hysteresis_ros.diagnosis.diagnose import diagnose
+    from hysteresis_ros.diagnosis.extend import extend, rmse
+    from hysteresis_ros.laboratory.protocols import protocol_tables
+    from hysteresis_ros.measurements.table import Measurement
+
+    group, protocol, effects, seed = case
+    started = time.perf_counter()
+    on_bench = tuple(item for item in effects.items() if item[0] in MATERIAL)
+    model = base_model(seed, on_bench, material)
+    train, test = (Measurement.from_columns(protocol_tables(protocol, effects, seed)[name])
+                   for name in ('train.csv', 'test.csv'))
+    found = diagnose(model, [train], seed=seed)
+    reported = set(found.missing).union(*found.alternatives) if found.missing else set()
+    result = {'group': group, 'protocol': protocol, 'truth': sorted(effects), 'seed': seed,
+              'verdict': found.verdict, 'missing': found.missing,
+              'alternatives': found.alternatives, 'reported': sorted(reported),
+              'rmse_before': found.rmse_before, 'rmse_after': found.rmse_after,
+              'structure': found.structural_error, 'unexplained': found.unexplained,
+              'seconds': time.perf_counter() - started,
+              'top': [(row['effect'], round(row['rmse_after'], 5), round(row['p_value'], 3))
+                      for row in found.ranking[:4]]}
+    if group in ('strong', 'weak') and found.missing:
+        clean = Measurement.from_columns(protocol_tables(protocol, {}, seed)['test.csv'])
+        extended = extend(model, found.missing, [train]).model
+        result['unseen'] = rmse(extended, [test])
+        result['clean'] = rmse(model, [clean])
+    return result
+
+
+def score(results):
+    """Return the scores that are asked for, each with the number of cases."""
+    def share(group, good):
+        chosen = [row for row in results if row['group'] == group]
+        return (100.0 * sum(map(good, chosen)) / len(chosen) if chosen else None), len(chosen)
+
+    scores = {}
+    for group in ('strong', 'weak'):
+        scores[f'truth in the reported set, {group} [%]'] = share(
+            group, lambda row: row['truth'][0] in row['reported'])
+    scores['truth named first, strong [%]'] = share(
+        'strong', lambda row: row['missing'][:1] == row['truth'])
+    sizes = [len(row['reported']) for row in results
+             if row['group'] in ('strong', 'weak') and row['reported']]
+    scores['mean size of the reported set'] = (float(np.mean(sizes)) if sizes else None,
+                                               len(sizes))
+    scores['false alarm when nothing is hidden [%]'] = share(
+        'none', lambda row: row['verdict'] in ('missing', 'unknown'))
+    scores['unknown when in no catalogue [%]'] = share(
+        'unknown', lambda row: row['verdict'] == 'unknown')
+    scores['both of a pair found [%]'] = share(
+        'pair', lambda row: set(row['truth']) <= set(row['reported']))
+    ratios = [row['unseen'] / row['clean'] for row in results if 'unseen' in row
+              and row['truth'][0] in row['missing']]
+    scores['error on the unseen recording over that without effect, median'] = (
+        float(np.median(ratios)) if ratios else None, len(ratios))
+    return scores
+
+
+def main():
+    """Run the grid and write the scores."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--seeds', type=int, default=5, help='for each effect and strength')
+    parser.add_argument('--others', type=int, default=20, help='cases of none, unknown, pairs')
+    parser.add_argument('--quick', action='store_true', help='every ninth case')
+    parser.add_argument('--only', help='one effect or group')
+    parser.add_argument('--first-seed', type=int)
+    parser.add_argument('--paper-model', action='store_true',
+                        help="identify without effects of the material")
+    parser.add_argument('--jobs', type=int, default=-1)
+    parser.add_argument('output', nargs='?', default='hidden.json', help='scores and cases')
+    args = parser.parse_args()
+    chosen = cases(args.seeds, args.others, args.quick)
+    if args.first_seed is not None:
+        chosen = [(group, protocol, effects, seed - FIRST_SEED + args.first_seed)
+                  for group, protocol, effects, seed in chosen]
+    if args.only:
+        chosen = [case for case in chosen if args.only in (case[0], *case[2])]
+    results = []
+    parallel = joblib.Parallel(n_jobs=args.jobs, return_as='generator')
+    for row in parallel(joblib.delayed(run)(case, not args.paper_model) for case in chosen):
+        results.append(row)
+        print(f'{len(results)}/{len(chosen)} {row["group"]} {row["protocol"]} {row["truth"]} '
+              f'seed {row["seed"]}: {row["verdict"]} {row["missing"]} {row["alternatives"]} '
+              f'{row["rmse_before"]:.4f} -> {row["rmse_after"]:.4f} ({row["structure"]:.4f}) '
+              f'{row["top"]} {row["seconds"]:.0f} s', file=sys.stderr, flush=True)
+    scores = score(results)
+    for name, (value, count) in scores.items():
+        text = 'no case' if value is None else f'{value:.4g}'
+        print(f'{name:64s} {text:>8s}   ({count} cases)')
+    Path(args.output).write_text(json.dumps(
+        {'scores': {name: value for name, (value, _) in scores.items()},
+         'cases': results}, indent=1) + '\n', encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()
