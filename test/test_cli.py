@@ -330,6 +330,13 @@ def test_the_module_runs_and_a_closed_pipe_is_no_error():
     assert done.stdout == 'electrical:\n' and done.stderr == ''
 
 
+def test_a_package_that_is_not_installed_is_one_line(bench, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
+    line = failed(['compare', '--model', f'{bench}/model.yaml', '--data', f'{bench}/force.csv',
+                   '--plots', f'{tmp_path}/plots'], capsys)
+    assert 'matplotlib.figure is not installed' in line
+
+
 def test_an_interrupt_is_one_line(bench, capsys, monkeypatch):
     def interrupt(path):
         raise KeyboardInterrupt

@@ -16,6 +16,8 @@ from hysteresis_ros.measurements import MeasurementWarning
 COMMANDS = ('identify', 'compare', 'diagnose', 'extend', 'invert', 'predict', 'simulate',
             'effects', 'table1', 'demo')
 
+PACKAGE = 'hysteresis_ros'
+
 DONE, FAILED, INTERRUPTED = 0, 1, 130
 
 
@@ -50,6 +52,12 @@ def main(arguments=None):
         except (HysteresisError, OSError) as error:
             print(f'hysteresis {args.command}: error: {one_line(described(error))}',
                   file=sys.stderr)
+            return FAILED
+        except ModuleNotFoundError as error:
+            if (error.name or PACKAGE).split('.')[0] == PACKAGE:
+                raise
+            print(f'hysteresis {args.command}: error: the Python package {error.name} is not '
+                  f'installed; pip install {error.name}', file=sys.stderr)
             return FAILED
         except KeyboardInterrupt:
             print(f'hysteresis {args.command}: interrupted', file=sys.stderr)
