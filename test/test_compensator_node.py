@@ -15,7 +15,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from hysteresis_ros.effects import catalogue
-from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.nodes import compensator_node
 from hysteresis_ros.nodes.compensator_node import CompensatorNode
 from hysteresis_ros.nodes.feedback import AngleFeedback
@@ -187,6 +187,26 @@ def test_wrong_reference_is_not_followed(graph, wrong, words):
     graph.until(lambda: len(muscle.voltages) == 2, 'two setpoints')
     assert values['references refused'] == '1'
     assert int(values['references received']) == 1 + int(values['setpoints published']) + 1
+
+
+def test_model_file_is_loaded_and_the_arm_of_the_parameters_counts(graph, tmp_path, capfd):
+    """The file's own arm is another one: that is worth a warning, not an error."""
+    other = dataclasses.replace(GEOMETRY_OF_TESTS, payload_mass=0.5)
+    dataclasses.replace(small_model(), geometry=other).save(tmp_path / 'model.yaml')
+    node = graph.make(CompensatorNode, model_file=str(tmp_path / 'model.yaml'))
+    assert node._model.geometry == GEOMETRY_OF_TESTS
+    assert 'payload_mass 0.5 instead of 0.1' in capfd.readouterr().err
+
+
+@pytest.mark.parametrize('change, words', [
+    ({'drive': 'pressure'}, 'from voltage to length'),
+    ({'length_stage': None}, 'from voltage to length')])
+def test_model_of_another_muscle_is_refused_at_start(graph, tmp_path, change, words):
+    """Not only when the first reference comes."""
+    path = tmp_path / 'model.yaml'
+    dataclasses.replace(small_model(), **change).save(path)
+    with pytest.raises(ModelFileError, match=f'model.yaml: .*{words}'):
+        graph.make(CompensatorNode, model_file=str(path))
 
 
 def test_small_reversals_are_not_followed(graph):

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 
 from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
-from hysteresis_ros.errors import RangeError
+from hysteresis_ros.errors import ModelFileError, RangeError
 from hysteresis_ros.share import share_path
 
 # The model's effects move an angle by a few degrees; each pass leaves a few percent of that.
@@ -35,13 +35,16 @@ def load_model(path: str, values: Mapping, logger):
     Raises
     ------
     ModelFileError
-        If it is no model file of this version.
+        If it is no model file of this version, or not of a muscle that lifts an arm by voltage.
     OSError
         If it cannot be read.
     """
     from hysteresis_ros.model import MuscleModel   # SciPy: not needed without a model
     path = path or share_path('config/bicep_model.yaml')
     model = MuscleModel.load(path)
+    if model.drive != 'voltage' or model.length_stage is None:
+        raise ModelFileError(f'{path}: the nodes need a model from voltage to length; identify one '
+                             'with --length')
     geometry = BicepGeometry.from_mapping(values)
     others = [] if model.geometry is None else [
         f'{name} {other:g} instead of {getattr(geometry, name):g}'
