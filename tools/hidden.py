@@ -147,7 +147,7 @@ def main():
     parser.add_argument('--only', help='one effect or group')
     parser.add_argument('--first-seed', type=int)
     parser.add_argument('--paper-model', action='store_true',
-                        help="identify without effects of the material")
+                        help='identify without effects of the material')
     parser.add_argument('--jobs', type=int, default=-1)
     parser.add_argument('output', nargs='?', default='hidden.json', help='scores and cases')
     args = parser.parse_args()
