@@ -10,11 +10,15 @@ import dataclasses
 import math
 from collections.abc import Callable
 
+from hysteresis_ros.laboratory.solve import RootFinder
+
 # d2 / d1 with the bench's fan [K/V^2], and the room's temperature [degC].
 GAIN = 2.7
 ROOM = 22.0
 # Specific heat of the wire [J/(kg K)].
 SPECIFIC_HEAT = 500.0
+# Heat counts as shared out when less than this is left over, over the specific heat [K].
+HEAT_TOLERANCE = 1e-4
 
 
 @dataclasses.dataclass
@@ -81,14 +85,10 @@ class HeatBalance:
         change = (balance - temperature) * (1.0 - math.exp(-rate * dt))
         if self.latent == 0.0 or share is None or abs(change) < 1e-9:
             return temperature + change
-        # The heat that came in is shared by warming and transforming: bisect for the part of the
-        # change that is left for the temperature, which is between none and all of it.
-        low, high = 0.0, 1.0
-        for _ in range(12):
-            part = 0.5 * (low + high)
-            spent = part * change + self.latent * (before - share(temperature + part * change))
-            if spent * math.copysign(1.0, change) > abs(change):
-                high = part
-            else:
-                low = part
-        return temperature + 0.5 * (low + high) * change
+        # The heat that came in is shared by warming and transforming: of the change, that part is
+        # left for the temperature with which nothing is left over.
+        sign = math.copysign(1.0, change)
+        part = RootFinder(2.0 * abs(change), HEAT_TOLERANCE)(
+            lambda part: abs(change) * (part - 1.0) + sign * self.latent * (
+                before - share(temperature + part * change)), 0.5, 0.0, 1.0)
+        return temperature + part * change
