@@ -4,6 +4,7 @@
 
 import dataclasses
 import math
+import time
 
 from node_support import GEOMETRY_OF_TESTS, Graph, small_model
 import numpy as np
@@ -259,7 +260,7 @@ class Arm:
         self._observer = dataclasses.replace(small_model(), geometry=other).observer()
         self._publisher = graph.publisher(JointState, 'joint_states')
         self._graph, self._muscle = graph, muscle
-        self._time = 0
+        self._time = math.ceil(time.time())
         self.angle = math.nan
 
     def advance(self, seconds):
@@ -275,7 +276,7 @@ class Arm:
 
 def test_feedback_takes_out_what_the_model_does_not_know(graph):
     """20 g more than the model's: without feedback the arm hangs too low, with it it does not."""
-    muscle = Muscle(graph, feedback=True, republish_period=0.0)
+    muscle = Muscle(graph, feedback=True, feedback_delay=0.0, republish_period=0.0)
     muscle.ask(1.7)
     first, = muscle.wait(1)
     arm = Arm(graph, muscle, 20.0)
@@ -291,7 +292,8 @@ def test_feedback_takes_out_what_the_model_does_not_know(graph):
 
 def test_feedback_rests_while_the_muscle_is_at_its_limit(graph):
     """Already at the largest voltage, so asking for more would only wind the integral up."""
-    muscle = Muscle(graph, feedback=True, republish_period=0.0, maximum_voltage=5.0)
+    muscle = Muscle(graph, feedback=True, feedback_delay=0.0, republish_period=0.0,
+                    maximum_voltage=5.0)
     muscle.ask(1.3)
     assert muscle.wait(1) == [5.0]
     arm = Arm(graph, muscle, 0.0)
@@ -331,6 +333,17 @@ def test_feedback_integral():
     assert feedback.step(3.0, 1.025, 0.925) == pytest.approx(0.04)
     feedback.reset()
     assert feedback.correction == 0.0
+
+
+def test_feedback_waits_after_a_new_target():
+    """Samples from before the arm has set out say nothing; what was corrected stays."""
+    feedback = AngleFeedback(gain=0.1, limit=1.0, rest_speed=0.01, period=1.0, delay=5.0)
+    feedback.step(0.0, 1.0, 1.1)
+    assert feedback.step(1.0, 1.0, 1.1) == pytest.approx(0.01)
+    feedback.begin(1.0)
+    for second in (2.0, 4.0, 5.9, 6.0):
+        assert feedback.step(second, 1.0, 1.5) == pytest.approx(0.01)
+    assert feedback.step(7.0, 1.0, 1.5) == pytest.approx(0.06)
 
 
 @pytest.mark.parametrize('saturated, error, change', [

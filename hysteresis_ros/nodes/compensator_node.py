@@ -47,6 +47,8 @@ COMPENSATION = (
          'correction waits', 'rad/s', 0.0001, 10.0),
     Spec('feedback_dead_band', 0.003, 'Angle error that is left alone', 'rad', 0.0, 1.0),
     Spec('feedback_period', 1.0, 'Time between two corrections', 's', 0.01, 60.0),
+    Spec('feedback_delay', 10.0, 'Time after a new reference before the first correction', 's',
+         0.0, 600.0),
 )
 
 
@@ -101,7 +103,7 @@ class CompensatorNode(Node):
         repeated = parameters['republish_period'] > 0.0
         self._controller.horizon = (parameters['horizon'] if repeated else 0.0) or math.inf
         self._integral.configure(*(parameters[f'feedback_{name}'] for name in (
-            'gain', 'limit', 'rest_speed', 'dead_band', 'period')))
+            'gain', 'limit', 'rest_speed', 'dead_band', 'period', 'delay')))
         if self._timer is not None:
             self.destroy_timer(self._timer)
             self._timer = None
@@ -128,6 +130,7 @@ class CompensatorNode(Node):
             return
         self._diagnostics.clear('reference')
         self._wanted, self._target = wanted, target
+        self._integral.begin(self._now())
         self._published += self._apply(self._corrected(wanted))
 
     def _corrected(self, wanted):

@@ -29,25 +29,34 @@ class AngleFeedback:
         never comes to rest on a muscle with hysteresis.
     period : float
         Time between two steps of the integral [s]; samples between them are passed over.
+    delay : float
+        Time after `begin` [s] in which samples do not count: they may be older than the new
+        target, or of an arm that has not set out for it yet.
     """
 
     def __init__(self, gain: float = 0.0, limit: float = 0.0, rest_speed: float = 0.0,
-                 dead_band: float = 0.0, period: float = 0.0):
-        self.configure(gain, limit, rest_speed, dead_band, period)
+                 dead_band: float = 0.0, period: float = 0.0, delay: float = 0.0):
+        self.configure(gain, limit, rest_speed, dead_band, period, delay)
         self.reset()
 
     def configure(self, gain: float, limit: float, rest_speed: float, dead_band: float,
-                  period: float) -> None:
+                  period: float, delay: float) -> None:
         """Change the settings and keep the correction."""
         self.gain = gain
         self.limit = limit
         self.rest_speed = rest_speed
         self.dead_band = dead_band
         self.period = period
+        self.delay = delay
 
     def reset(self) -> None:
         """Forget the correction and the last sample."""
         self.correction = 0.0
+        self.begin(-math.inf)
+
+    def begin(self, time: float) -> None:
+        """Take note of a new target at the time [s]; the correction stays."""
+        self._begun = time
         self._time = None
         self._angle = None
 
@@ -71,7 +80,7 @@ class AngleFeedback:
         float
             What has to be added to the target [rad]; between -limit and limit.
         """
-        if not math.isfinite(angle):
+        if not math.isfinite(angle) or time < self._begun + self.delay:
             return self.correction
         elapsed = math.inf if self._time is None else time - self._time
         if 0.0 <= elapsed < self.period:
