@@ -71,7 +71,7 @@ class ArmBalance:
         for operator in self.operators:
             operator.reset()
         self._gain = 1.5
-        self._angle = None
+        self._angle = self._inputs = None
         self._velocity = 0.0
 
     def settle(self, x: float) -> float:
@@ -111,7 +111,7 @@ class ArmBalance:
         dt = dt if moving else 0.0
         drag = 0
         if self.coulomb > 0.0 and self._angle is not None:
-            drag = self._direction(x, offset, factor, dt)
+            drag = self._direction(x, dt)
             if drag == 0:
                 self._velocity = 0.0
                 return self._angle
@@ -123,14 +123,13 @@ class ArmBalance:
         self._angle = angle
         return angle
 
-    def _direction(self, x, offset, factor, dt):
+    def _direction(self, x, dt):
         """Direction in which the arm slides, 0 where friction holds it."""
         place = self._present()
         if self._bundle is None:
             tension = self.operators[0].input + x
         else:
-            output = self.base + self._lines[0].demand_at(*place, offset) / factor
-            tension = self._bundle.share(self._bundle.inputs(output), x)
+            tension = self._bundle.share(self._inputs, x)
         if self._required(self._lines[1], *place, dt) > tension:
             return 1
         return -1 if self._required(self._lines[-1], *place, dt) < tension else 0
@@ -206,7 +205,8 @@ class ArmBalance:
         if self._angle is not None:
             near = base + line.demand_at(*self._present(), offset) / factor
         output = bundle.settle(required, x, low, high, near)
-        bundle.step(bundle.inputs(output))
+        self._inputs = bundle.inputs(output)
+        bundle.step(self._inputs)
         return factor * (output - base)
 
 

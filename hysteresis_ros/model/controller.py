@@ -19,6 +19,8 @@ from hysteresis_ros.model.muscles import Muscles
 
 # Passes that bring a clipped drive into agreement with the phase that it causes.
 PHASE_PASSES = 20
+# What a longer time between two calls of `hold` counts in the next one.
+FADING = 0.9
 
 
 class Setpoint(NamedTuple):
@@ -394,7 +396,7 @@ class Controller:
         if math.isfinite(inputs.ambient):
             self._ambient = inputs.ambient
         if time is not None and math.isfinite(self.horizon):
-            self._deadline = time + self.horizon
+            self._deadline, self._period = time + self.horizon, 0.0
             drive = self._towards(outcome.heat, inputs.phase, self.horizon)
         self._apply(drive)
         return drive
@@ -411,9 +413,9 @@ class Controller:
         time : float
             Now [s].
         """
-        self._advance(time)
+        # The next call may be late: longer than a period overdriven, the muscle would swing.
+        self._period = max(self._advance(time), FADING * self._period)
         if math.isfinite(self.horizon) and not self._fresh and self._time is not None:
-            # Shorter than the time to the next call it would be overdriven for too long.
             remaining = max(self._deadline - self._time, self._period)
             self._apply(self._towards(self._target, self._phase, remaining))
         return self._voltage
@@ -427,17 +429,18 @@ class Controller:
         self._voltage = drive
 
     def _advance(self, time):
-        """Let the lagging muscle feel what was applied until now."""
+        """Let the lagging muscle feel what was applied until now, and return for how long [s]."""
         if time is None or not math.isfinite(time):
-            return
+            return 0.0
         if self._time is None:
             self._chain.step(self._voltage, self._inputs(0.0, self._phase, math.nan))
             self._time = time
         elapsed = time - self._time
         if elapsed <= 0.0:
-            return
+            return 0.0
         self._chain.step(self._voltage, self._inputs(elapsed, self._phase, math.nan))
-        self._time, self._period = time, elapsed
+        self._time = time
+        return elapsed
 
     def _inputs(self, step, phase, ambient) -> Inputs:
         if not math.isfinite(ambient) and self._ambient is not None:

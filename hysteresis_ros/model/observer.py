@@ -6,6 +6,9 @@ import math
 
 from hysteresis_ros.effects import Inputs
 
+# Beyond, in any unit, it is no drive: its square would overflow what the lags remember.
+LARGEST_DRIVE = 1e12
+
 
 class Observer:
     """
@@ -62,7 +65,8 @@ class Observer:
         time : float
             Time [s]. One that does not grow counts as no time.
         drive : float
-            Drive since the sample before. A value that is not finite counts as the one before.
+            Drive since the sample before. No number, or one beyond all reason, counts as the one
+            before.
         ambient : float
             Ambient temperature [degC], NaN if unknown.
 
@@ -71,7 +75,7 @@ class Observer:
         float
             Predicted angle [rad] as the sensor would give it.
         """
-        if not math.isfinite(drive):
+        if not abs(drive) < LARGEST_DRIVE:
             drive = self._drive
         before = time if self._time is None else self._time
         if not time >= before:
