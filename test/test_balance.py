@@ -1,0 +1,283 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The arm's balance against brute force: a search over a fine grid with relays of its own."""
+
+import math
+
+from hypothesis import given, settings, strategies as st
+import numpy as np
+import pytest
+from scipy import integrate, optimize
+
+from hysteresis_ros.bicep.balance import ArmBalance
+from hysteresis_ros.bicep.bundle import Bundle, ELASTICITY
+from hysteresis_ros.effects import MaterialEffect
+from hysteresis_ros.operators import Linear
+from model_support import bicep_model, effect_of, GEOMETRY
+
+MODEL = bicep_model()
+LOW, HIGH = GEOMETRY.angle_range
+
+
+def balance(*names, **values):
+    """Balance of the bicep with effects of these names, or of one name with values."""
+    model = MODEL.with_effects([effect_of(MODEL, name, **values) for name in names])
+    made = model.balance(model.chain())
+    made.settle(0.5)
+    return made
+
+
+class Brute:
+    """The same arm, solved by brentq over angles with a second stage of its own."""
+
+    def __init__(self, x, load=GEOMETRY.force, length=GEOMETRY.length):
+        self.stage = MODEL.require_length_stage()
+        self.load, self.length = load, length
+        self.step(x)
+
+    def step(self, x):
+        """Return the angle [rad] at which the wire is as long as the arm lets it."""
+        def gap(theta):
+            return self.stage.peek(self.load(theta) - x) - self.length(theta)
+
+        grid = np.linspace(LOW, HIGH, 400)
+        values = np.array([gap(theta) for theta in grid])
+        change = np.flatnonzero(np.diff(np.sign(values)))
+        assert len(change) == 1
+        theta = optimize.brentq(gap, grid[change[0]], grid[change[0] + 1], xtol=1e-12)
+        self.stage.step(self.load(theta) - x)
+        return theta
+
+
+X = [3.0, 8.0, 5.0, 11.0, 2.0, 6.5, 6.4, 13.0, 0.5]
+
+
+def test_angles_are_those_of_brute_force():
+    made, brute = balance(), Brute(0.5)
+    for x in X:
+        assert made.step(x, 30.0) == pytest.approx(brute.step(x), abs=5e-7)
+
+
+def test_angles_with_stretch_stroke_and_shift_are_those_of_brute_force():
+    made = balance('stress_dependence', 'series_compliance', 'stress_dependent_strain')
+    base = MODEL.length_stage.output_range[0]
+
+    def load(theta):
+        return 1.15 * GEOMETRY.force(theta) - 0.15 * 3.0
+
+    def length(theta):
+        force = GEOMETRY.force(theta)
+        share = ((1.0 - 0.5 * np.exp(-force / 3.6)) / (1.0 - 0.5 * math.exp(-1.0 / 1.2)))
+        return base + (GEOMETRY.length(theta) - 0.05e-3 * (force - 3.0) - base) / share
+
+    brute = Brute(0.5, load, length)
+    for x in X:
+        assert made.step(x, 30.0) == pytest.approx(brute.step(x), abs=5e-7)
+
+
+def test_offset_is_added_to_the_length_whatever_the_load_does_to_the_stroke():
+    made = balance('stress_dependent_strain')
+    base, stage = made.base, made.operators[0]
+    for x, offset, factor in ((5.0, 1e-3, 1.0), (8.0, -1e-3, 0.9), (4.0, 5e-4, 1.05)):
+        theta = made.step(x, 30.0, offset, factor)
+        force = GEOMETRY.force(theta)
+        share = (1.0 - 0.5 * np.exp(-force / 3.6)) / (1.0 - 0.5 * math.exp(-1.0 / 1.2))
+        assert stage.input == pytest.approx(force - x, abs=1e-5)
+        assert GEOMETRY.length(theta) == pytest.approx(
+            base + share * factor * (stage.output - base) + offset, abs=1e-8)
+
+
+@settings(max_examples=30)
+@given(st.lists(st.floats(-5.0, 25.0), min_size=1, max_size=15))
+def test_angle_follows_the_first_stage_one_way_and_is_always_a_number(sequence):
+    made = balance()
+    before, last = made.settle(0.5), 0.5
+    for x in sequence:
+        theta = made.step(x, 30.0)
+        assert LOW <= theta <= HIGH
+        if x > last:
+            assert theta <= before + 1e-9
+        elif x < last:
+            assert theta >= before - 1e-9
+        before, last = theta, x
+
+
+def test_the_path_does_not_depend_on_how_finely_it_is_sampled():
+    coarse, fine = balance(), balance()
+    corners = [0.5, 9.0, 4.0, 12.0, 1.0]
+    for start, stop in zip(corners[:-1], corners[1:]):
+        for x in np.linspace(start, stop, 40)[1:]:
+            theta = fine.step(float(x), 0.1)
+        assert coarse.step(stop, 30.0) == pytest.approx(theta, abs=1e-8)
+
+
+def test_start_wipes_the_memory():
+    made = balance()
+    first = [made.step(x, 30.0) for x in X]
+    made.start()
+    made.settle(0.5)
+    assert [made.step(x, 30.0) for x in X] == pytest.approx(first, abs=1e-9)
+
+
+def test_friction_sticks_within_its_band_and_slides_at_its_edge():
+    made = balance('coulomb_friction', tau_c=0.03)
+    theta = made.step(6.0, 30.0)
+    # Sliding down the wire pulls against load and friction.
+    leverage = 3.0 * GEOMETRY.moment_arm(theta)
+    assert made.operators[0].input + 6.0 == pytest.approx(
+        (GEOMETRY.load_moment(theta) + 0.03) / leverage, abs=1e-5)
+    width = 2.0 * 0.03 / leverage
+    for x in (6.0, 6.0 - 0.5 * width, 6.0 - 0.99 * width, 5.99):
+        assert made.step(x, 30.0) == theta
+    risen = made.step(6.0 - 1.2 * width, 30.0)
+    assert risen > theta
+    assert made.operators[0].input + 6.0 - 1.2 * width == pytest.approx(
+        (GEOMETRY.load_moment(risen) - 0.03) / (3.0 * GEOMETRY.moment_arm(risen)), abs=1e-5)
+
+
+def test_friction_holds_against_a_drifting_length():
+    made = balance('coulomb_friction', tau_c=0.03)
+    theta = made.step(6.0, 30.0)
+    assert made.step(5.9, 30.0, 1e-5) == theta
+
+
+def test_the_cold_arm_settles_without_friction():
+    assert balance('coulomb_friction', tau_c=0.1).settle(0.5) == balance().settle(0.5)
+
+
+def free_arm(x_of_time, duration, viscous, inertia, start):
+    """Integrate the arm on a wire without hysteresis, as its equation of motion says."""
+    def force(theta):
+        # A reversible wire: length = slope * u.
+        return (GEOMETRY.length(theta) - INTERCEPT) / SLOPE
+
+    def slope(t, y):
+        theta, speed = y
+        pull = 3.0 * (force(theta) + x_of_time(t)) * GEOMETRY.moment_arm(theta)
+        moment = GEOMETRY.load_moment(theta) - pull
+        if inertia == 0.0:
+            return [moment / viscous, 0.0]
+        return [speed, (moment - viscous * speed) / inertia]
+
+    return integrate.solve_ivp(slope, (0.0, duration), [start, 0.0], rtol=1e-9, atol=1e-9,
+                               dense_output=True, method='LSODA').sol
+
+
+SLOPE, INTERCEPT = 0.8e-3, -6e-3
+
+
+def reversible_balance(name, **values):
+    """Balance with a second stage that is a straight line."""
+    model = bicep_model(length_stage=Linear(SLOPE, INTERCEPT, -30.0, 30.0))
+    model = model.with_effects([effect_of(model, name, **values)])
+    return model.balance(model.chain())
+
+
+@pytest.mark.parametrize('name, values, viscous, inertia, step, tolerance', [
+    ('viscous_friction', {'b': 0.5}, 0.5, 0.0, 0.005, 0.03),
+    ('inertia', {'I': 0.01}, 0.0, 0.01, 0.001, 0.06)])
+def test_motion_is_that_of_the_equation_of_motion(name, values, viscous, inertia, step, tolerance):
+    made = reversible_balance(name, **values)
+    start = made.settle(4.0)
+    true = free_arm(lambda t: 6.0, 0.5, viscous, inertia, start)
+    time = step * np.arange(1, int(0.5 / step) + 1)
+    seen = np.array([made.step(6.0, step) for _ in time])
+    stroke = np.ptp(true(time)[0])
+    assert stroke > 0.02
+    assert np.max(np.abs(seen - true(time)[0])) < tolerance * stroke
+
+
+def test_viscous_friction_vanishes_in_the_long_run_and_blocks_in_the_short():
+    made, free = balance('viscous_friction', b=1.0), balance()
+    start = made.settle(0.5)
+    assert abs(made.step(8.0, 1e-6) - start) < 1e-4
+    assert made.step(8.0, 30.0) == pytest.approx(free.step(8.0, 30.0), abs=1e-6)
+
+
+def test_heavier_arms_ring_and_come_to_rest():
+    made = balance('inertia', I=0.01)
+    made.step(3.0, 30.0)
+    rest = balance()
+    rest.step(3.0, 30.0)
+    end = rest.step(8.0, 30.0)
+    path = np.array([made.step(8.0, 0.02) for _ in range(1500)])
+    assert path.min() < end - 0.01
+    assert np.ptp(path[-50:]) < 1e-3
+
+
+@pytest.mark.parametrize('name', ['viscous_friction', 'inertia'])
+def test_no_time_moves_nothing(name):
+    made = balance(name)
+    start = made.settle(0.5)
+    assert made.step(9.0, 0.0) == start
+    assert made.step(9.0, 0.1) < start
+
+
+def test_a_load_that_does_not_count_leaves_the_length_to_the_drive():
+    made = ArmBalance(MODEL.require_length_stage(), GEOMETRY, MODEL.chain(), loaded=False)
+    made.settle(-5.0)
+    stage = MODEL.require_length_stage()
+    stage.step(5.0)
+    for x in (2.0, 5.0, -1.0):
+        theta = made.step(x, 30.0)
+        assert GEOMETRY.length(theta) == pytest.approx(stage.step(-x), abs=2e-8)
+
+
+class Wires(MaterialEffect):
+    """Three muscles of given excess lengths, equal ones included."""
+
+    id = 'wires'
+
+    def __init__(self, *offsets):
+        super().__init__()
+        self.offsets = offsets
+
+
+@pytest.mark.parametrize('names', [(), ('coulomb_friction',), ('viscous_friction',),
+                                   ('stress_dependent_strain', 'coulomb_friction')])
+def test_equal_muscles_in_parallel_are_one(names):
+    one = balance(*names)
+    model = MODEL.with_effects([*(effect_of(MODEL, name) for name in names), Wires(0., 0., 0.)])
+    three = model.balance(model.chain())
+    assert len(three.operators) == 3
+    assert three.settle(0.5) == pytest.approx(one.settle(0.5), abs=1e-8)
+    for n, x in enumerate(X):
+        offset = 1e-4 * n
+        assert three.step(x, 0.5, offset, 0.98) == pytest.approx(
+            one.step(x, 0.5, offset, 0.98), abs=1e-7)
+
+
+def test_unequal_muscles_share_the_load_of_brute_force():
+    offsets = (-0.8e-3, 0.0, 1.2e-3)
+    made = balance('unequal_muscles', shorter=0.8, longer=1.2)
+    stages = [MODEL.require_length_stage() for _ in offsets]
+    for x in [0.5, *X]:
+        def lacking(theta, commit=False, x=x):
+            total = 0.0
+            for stage, excess in zip(stages, offsets):
+                wanted = GEOMETRY.length(theta) - excess
+                low, high = stage.output_range
+                u = optimize.brentq(lambda v, stage=stage, wanted=wanted: stage.peek(v) - min(
+                    max(wanted, low), high), stage.lower, stage.upper, xtol=1e-13)
+                u += ELASTICITY * (wanted - min(max(wanted, low), high))
+                total += max(u + x, 0.0)
+                if commit:
+                    stage.step(u)
+            return GEOMETRY.force(theta) - total / 3.0
+
+        theta = optimize.brentq(lacking, 0.9, 2.3, xtol=1e-12)
+        lacking(theta, commit=True)
+        assert made.step(x, 30.0) == pytest.approx(theta, abs=2e-6)
+
+
+@given(st.lists(st.floats(-20.0, 20.0), min_size=1, max_size=4), st.floats(0.01, 30.0))
+def test_drive_of_a_bundle_undoes_its_share(inputs, load):
+    bundle = Bundle(MODEL.require_length_stage(), (0.0,) * len(inputs))
+    assert bundle.share(inputs, bundle.drive(inputs, load)) == pytest.approx(load, rel=1e-9)
+
+
+def test_bundle_stays_within_the_limits_of_its_search():
+    bundle = Bundle(MODEL.require_length_stage(), (0.0, 1e-3))
+    assert bundle.settle(lambda output: 1e9, 0.0, -0.02, 0.0, -0.01) == 0.0
+    assert bundle.settle(lambda output: -1e9, 0.0, -0.02, 0.0, -0.01) == -0.02
+    assert bundle.settle(lambda output: 1e9, 0.0, -0.02, 0.0, 5.0) == 0.0
