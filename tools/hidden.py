@@ -26,10 +26,6 @@ STRENGTHS = {'strong': 1.0, 'weak': 0.4}
 TRANSIENT = {'thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'creep',
              'viscous_friction', 'inertia', 'latency', 'ambient_drift', 'fatigue'}
 
-# Effects of the wire itself act on the bench, too.
-MATERIAL = {'stress_dependence', 'stress_dependent_strain', 'r_phase', 'creep', 'fatigue',
-            'latent_heat', 'resistance_change'}
-
 
 def cases(seeds, others, quick=False):
     """Return (group, protocol, effects by strength, seed) of every case."""
@@ -59,8 +55,8 @@ def cases(seeds, others, quick=False):
 
 
 @functools.lru_cache(maxsize=8)
-def base_model(seed, effects, material):
-    """Identify the bench of the specimen; effects of the material act there, too."""
+def base_model(seed, material):
+    """Identify the bench of the specimen, on which nothing is hidden."""
     from hysteresis_ros.bicep import BicepGeometry
     from hysteresis_ros.identification.bench import identify
     from hysteresis_ros.identification.effects import add_effects
@@ -68,7 +64,7 @@ def base_model(seed, effects, material):
     from hysteresis_ros.laboratory.protocols import protocol_tables
     from hysteresis_ros.measurements.table import Measurement
 
-    tables = protocol_tables('bench', dict(effects), seed)
+    tables = protocol_tables('bench', {}, seed)
     force, length = (Measurement.from_columns(tables[name]) for name in
                      ('force.csv', 'length.csv'))
     trials = {'length_trials': range(4), 'force_trials': [0]}
@@ -87,8 +83,7 @@ def run(case, material):
 
     group, protocol, effects, seed = case
     started = time.perf_counter()
-    on_bench = tuple(item for item in effects.items() if item[0] in MATERIAL)
-    model = base_model(seed, on_bench, material)
+    model = base_model(seed, material)
     train, test = (Measurement.from_columns(protocol_tables(protocol, effects, seed)[name])
                    for name in ('train.csv', 'test.csv'))
     found = diagnose(model, [train], seed=seed)
