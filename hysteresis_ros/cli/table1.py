@@ -1,0 +1,93 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`hysteresis table1`: the paper's experiment in the virtual laboratory, beside its Table I."""
+
+import argparse
+
+from hysteresis_ros.cli.common import add_json, progress, say, write_json
+
+HEADERS = {'two-stage': 'two-stage', 'linear': 'linear', 'with effects': '+ effects'}
+
+
+def add_parser(subparsers):
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        'table1', help="the paper's experiment in the virtual laboratory",
+        description='Identifies, verifies and compensates as in Sec. VII of the paper, on several '
+        "specimens of the virtual laboratory, and prints the paper's Table I beside ours.")
+    parser.add_argument('--seeds', type=count, default=5, metavar='N',
+                        help='number of specimens (default: 5)')
+    parser.add_argument('--first-seed', type=seed, default=0, metavar='S',
+                        help='seed of the first (default: 0)')
+    parser.add_argument('--effects', default='none', metavar='none|auto|A,B',
+                        help='also the two-stage model with effects: those that the bench proves '
+                        '(auto), or those named (default: none)')
+    parser.add_argument('--jobs', type=count, default=1, metavar='N',
+                        help='processes for the search of effects (default: 1)')
+    add_json(parser)
+    return parser
+
+
+def count(text):
+    """Return a positive whole number."""
+    number = seed(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f'{text!r} is not a positive whole number')
+    return number
+
+
+def seed(text):
+    """Return a whole number from 0 on."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f'{text!r} is not a whole number from 0 on')
+    return int(text)
+
+
+def run(args):
+    """Do it."""
+    from hysteresis_ros.table1 import table1
+
+    effects = {'none': (), 'auto': None}.get(args.effects, args.effects.split(','))
+    seeds = range(args.first_seed, args.first_seed + args.seeds)
+    result = table1(progress(seeds, 'specimens'), effects, args.jobs)
+    say(args, report(result))
+    if args.json:
+        write_json(args.json, result)
+
+
+def report(result):
+    """
+    Return the table for a terminal.
+
+    Parameters
+    ----------
+    result : dict
+        As `hysteresis_ros.table1.table1` returns it.
+
+    Returns
+    -------
+    str
+
+    """
+    from hysteresis_ros.diagnosis.compare import layout
+
+    methods = list(result['rows'][0]['ours'])
+    lines = [f'Table I of the paper and of {len(result["seeds"])} specimens of the laboratory: '
+             'mean error (standard deviation)']
+    rows = [['', *(f'paper, {HEADERS[method]}' for method in result['rows'][0]['paper']),
+             *(f'ours, {HEADERS[method]}' for method in methods)]]
+    for row in result['rows']:
+        cells = [f'{values["mean"]:.2f} ({values["std"]:.2f}) {row["unit"]}'
+                 for values in (*row['paper'].values(), *row['ours'].values())]
+        rows.append([row['name'], *cells])
+    lines += layout(rows)
+    lines += ['', 'The models that the paper compares with:']
+    rows = []
+    for name, values in result['baselines'].items():
+        unit = '' if '(mm)' in name else ' %'
+        rows.append([name, *(f'{part} {value:.2f}{unit}' for part, value in values.items())])
+    lines += layout(rows)
+    for one in result['seeds']:
+        if one['effects']:
+            lines.append(f'specimen {one["seed"]}: + {", ".join(one["effects"])}')
+    return '\n'.join(lines)
