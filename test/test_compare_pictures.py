@@ -10,8 +10,9 @@ from types import SimpleNamespace
 from hypothesis import given, strategies
 from hysteresis_ros.diagnosis import page
 from hysteresis_ros.diagnosis.compare import compare
-from hysteresis_ros.diagnosis.compare_page import comparison_page, rendered, summary
+from hysteresis_ros.diagnosis.compare_page import comparison_page, rendered, summary, trials
 from hysteresis_ros.diagnosis.plots import along, figures, new_figure, png, thinned
+from hysteresis_ros.measurements import Measurement
 import numpy as np
 import pytest
 from test_compare import FakeModel, run
@@ -49,7 +50,6 @@ def test_overlay_shows_measured_predicted_and_residual_in_degrees(comparison):
 
 
 def test_a_bench_table_has_its_plane(comparison):
-    from hysteresis_ros.measurements import Measurement
     drive = np.tile(np.linspace(0, 6, 20), 3)
     table = Measurement.from_columns({
         'voltage': drive, 'length': 2 - 0.1 * drive, 'force': np.repeat([1.0, 2, 3], 20)})
@@ -57,6 +57,39 @@ def test_a_bench_table_has_its_plane(comparison):
     assert 'plane' in drawn and 'since_step' not in drawn
     assert drawn['plane'].axes[0].get_ylabel() == 'force [N]'
     assert png(drawn['overlay']).startswith(b'\x89PNG')
+
+
+def stepped(trials=1):
+    """Return a run of held voltages whose response lags, on the bicep."""
+    time = np.arange(0, 600 * trials, 0.5)
+    levels = np.random.default_rng(4).uniform(0, 6, 20 * trials)
+    step = (time / 30).astype(int)
+    lag = np.exp(-(time - 30 * step) / 4) * np.diff(levels, prepend=0)[step]
+    trial = (time / 600).astype(int)
+    return Measurement.from_columns({
+        'time': time - 600 * trial, 'trial': trial, 'voltage': levels[step],
+        'angle': 2 - 0.1 * (levels[step] - lag)})
+
+
+def test_a_lag_shows_against_the_time_since_a_step(comparison):
+    geometry = SimpleNamespace(force=lambda theta: 5 - theta, angle_range=(0.5, 2.5))
+    model = FakeModel(geometry=geometry)
+    drawn = figures(compare(model, [stepped()]))
+    assert {'since_step', 'plane'} <= set(drawn)
+    axis = drawn['since_step'].axes[0]
+    assert axis.get_xscale() == 'log'
+    rise, fall = (container.lines[0].get_ydata() for container in axis.containers)
+    assert rise[0] > 1.0 and fall[0] < -1.0
+    assert abs(rise[-1]) < 0.1 * rise[0]
+    assert drawn['plane'].axes[0].get_ylabel() == 'force [N]'
+
+
+def test_many_trials_are_listed_worst_first():
+    found = compare(FakeModel(), [stepped(trials=3)])
+    html = comparison_page(found, {}, 'm.yaml')
+    assert 'The 2 worst of 3 trials.' in ''.join(trials(found, most=2))
+    assert html.count('<td>memory</td>') == 3
+    assert len(figures(found)['overlay'].axes[0].lines) == 5
 
 
 def test_the_waterfall_shows_every_step_of_an_extension(comparison):
@@ -70,7 +103,6 @@ def test_the_waterfall_shows_every_step_of_an_extension(comparison):
 
 
 def test_a_single_row_is_drawn():
-    from hysteresis_ros.measurements import Measurement
     table = Measurement.from_columns({'time': [0.0], 'voltage': [1.0], 'angle': [1.8]})
     assert all(data.startswith(b'\x89PNG')
                for data in rendered(figures(compare(FakeModel(), [table]))).values())
