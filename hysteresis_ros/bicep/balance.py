@@ -15,6 +15,7 @@ import copy
 import math
 
 import numpy as np
+from scipy import optimize
 
 from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.bicep.geometry import BicepGeometry
@@ -60,6 +61,8 @@ class ArmBalance:
         # Lines of state for an arm that slides down, rests, and slides up.
         self._lines = {drag: _Line(statics, leverage, drag * self.coulomb, self.base, chain, loaded)
                        for drag in ((-1, 0, 1) if self.coulomb > 0.0 else (0,))}
+        # Whether what the muscle has to give does not depend on friction.
+        self._rigid = all(line.demand == self._lines[0].demand for line in self._lines.values())
         self.has_dynamics = self.viscous > 0.0 or self.inertia > 0.0
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
         self._bundle = Bundle(operator, chain.offsets) if len(chain.offsets) > 1 else None
@@ -111,7 +114,7 @@ class ArmBalance:
         dt = dt if moving else 0.0
         drag = 0
         if self.coulomb > 0.0 and self._angle is not None:
-            drag = self._direction(x, dt)
+            drag = self._direction(x, offset, factor, dt)
             if drag == 0:
                 self._velocity = 0.0
                 return self._angle
@@ -123,16 +126,47 @@ class ArmBalance:
         self._angle = angle
         return angle
 
-    def _direction(self, x, dt):
+    def _direction(self, x, offset, factor, dt):
         """Direction in which the arm slides, 0 where friction holds it."""
         place = self._present()
-        if self._bundle is None:
-            tension = self.operators[0].input + x
-        else:
-            tension = self._bundle.share(self._inputs, x)
-        if self._required(self._lines[1], *place, dt) > tension:
+        if self._rigid:
+            held = self._inputs or [self.operators[0].input]
+            tension = Bundle.share(held, x)
+            if self._required(self._lines[1], *place, dt) > tension:
+                return 1
+            return -1 if self._required(self._lines[-1], *place, dt) < tension else 0
+        found = {}
+
+        def lacking(drag):
+            # Between rest and sliding friction takes off a part of what it can.
+            edge, share = self._lines[1 if drag > 0.0 else -1], abs(drag)
+            demand, load = (
+                (1.0 - share) * rest + share * most for rest, most in zip(
+                    (self._lines[0].demand_at(*place, offset),
+                     self._required(self._lines[0], *place, dt)),
+                    (edge.demand_at(*place, offset), self._required(edge, *place, dt))))
+            found['inputs'] = self._inputs_at(self.base + demand / factor)
+            return load - Bundle.share(found['inputs'], x)
+
+        if lacking(1.0) > 0.0:
             return 1
-        return -1 if self._required(self._lines[-1], *place, dt) < tension else 0
+        if lacking(-1.0) < 0.0:
+            return -1
+        lacking(optimize.brentq(lacking, -1.0, 1.0, xtol=1e-13))
+        # The arm stands still, but its load has changed, and with it what the load does.
+        self._commit(found['inputs'])
+        return 0
+
+    def _inputs_at(self, output):
+        if self._bundle is None:
+            return [self.operators[0].solve(output)[0]]
+        return self._bundle.inputs(output)
+
+    def _commit(self, inputs):
+        for operator, u in zip(self.operators, inputs):
+            operator.step(u)
+        if self._bundle is not None:
+            self._inputs = inputs
 
     def _present(self):
         """Interval on the grid, and share of it, of the present angle."""
@@ -205,8 +239,7 @@ class ArmBalance:
         if self._angle is not None:
             near = base + line.demand_at(*self._present(), offset) / factor
         output = bundle.settle(required, x, low, high, near)
-        self._inputs = bundle.inputs(output)
-        bundle.step(self._inputs)
+        self._commit(bundle.inputs(output))
         return factor * (output - base)
 
 

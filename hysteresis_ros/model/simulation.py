@@ -90,6 +90,7 @@ class Simulator:
     stride : int
         In a continuous arm run only every `stride`-th row is balanced, and every row at which
         the first stage turns round, so that the memory stays exact; rows between are interpolated.
+        An arm with inertia or viscous friction is balanced in every row all the same.
     """
 
     def __init__(self, model, measurement, stride: int = 1):
@@ -187,7 +188,8 @@ class Simulator:
     def _angle(self, chain, first, balance, trial, inputs, inputs_of_stage):
         cold, x, heat = self._first(chain, first, trial, inputs)
         offset, factor = chain.drift(trial.drive, heat, inputs)
-        chosen = self._chosen_rows(x)
+        # A moving arm feels what it is driven with in every row.
+        chosen = self._chosen_rows(x, 1 if balance.has_dynamics else self.stride)
         steps = np.diff(np.cumsum(inputs.step)[chosen], prepend=0.0).tolist()
         balance.start()
         balance.settle(cold)
@@ -202,11 +204,11 @@ class Simulator:
             return np.array(angles)
         return np.interp(inputs.time, inputs.time[chosen], angles)
 
-    def _chosen_rows(self, x):
+    def _chosen_rows(self, x, stride):
         rows = np.arange(len(x))
-        if self.stride == 1:
+        if stride == 1:
             return rows
-        return rows[(rows % self.stride == 0) | turning_rows(x)]
+        return rows[(rows % stride == 0) | turning_rows(x)]
 
 
 def turning_rows(x: np.ndarray) -> np.ndarray:
