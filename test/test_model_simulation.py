@@ -1,0 +1,230 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Simulation of whole measurements: trials, strides, phases, and the paper's linear model."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import optimize
+
+from hysteresis_ros.effects import catalogue
+from hysteresis_ros.errors import ModelFileError, ParameterError
+from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.model import LinearModel, Simulator
+from hysteresis_ros.model.simulation import trials_of, turning_rows
+from model_support import arm_run, bicep_model, effect_of, GEOMETRY, STRENGTHS, wandering_voltage
+
+VOLTAGE = wandering_voltage(800, seed=2)
+# What depends on time makes rows between the chosen ones matter.
+WITH_TIME = ('thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'viscous_friction',
+             'inertia', 'latency', 'creep', 'ambient_drift', 'resistance_change', 'r_phase',
+             'fatigue', 'ambient_temperature')
+
+
+def table(trials=((0.0, 4.0, 2.0), (1.0, 5.0)), **columns):
+    """A length table of trials without times."""
+    voltage = np.concatenate(trials)
+    return Measurement.from_columns({
+        'trial': np.concatenate([np.full(len(t), n) for n, t in enumerate(trials)]),
+        'step': np.concatenate([np.arange(len(t)) for t in trials]), 'voltage': voltage,
+        'force': np.full(len(voltage), 4.0), 'length': np.zeros(len(voltage)), **columns})
+
+
+def test_trials_carry_time_clock_and_cycles():
+    model = bicep_model()
+    first, second = trials_of(model, table())
+    assert first.inputs.time.tolist() == [30.0, 60.0, 90.0]
+    assert first.inputs.step.tolist() == [30.0, 30.0, 30.0]
+    assert second.inputs.clock.tolist() == [120.0, 150.0]
+    np.testing.assert_allclose(first.inputs.cycles, np.array([0.0, 4.0, 6.0]) / 12.0)
+    # Each trial starts from no voltage.
+    np.testing.assert_allclose(second.inputs.cycles, np.array([7.0, 11.0]) / 12.0)
+    assert np.all(np.isnan(first.inputs.ambient))
+    assert (second.rows.start, second.drive.tolist(), second.load.tolist()) == (
+        3, [1.0, 5.0], [4.0, 4.0])
+
+
+def test_time_of_a_recording_counts_from_the_start_of_the_trial():
+    trial, = trials_of(bicep_model(), arm_run([1.0, 2.0, 3.0], 0.5, first=0.0,
+                                              ambient_temperature=[20.0, 21.0, 22.0]))
+    assert trial.inputs.step.tolist() == [0.0, 0.5, 0.5]
+    assert trial.inputs.ambient.tolist() == [20.0, 21.0, 22.0]
+    assert trial.load.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_the_first_settled_row_is_settled_even_at_time_zero():
+    model = bicep_model(['thermal_lag', 'viscous_friction'])
+    late, early = (model.predict(arm_run([4.0, 1.0], 30.0, first=first)) for first in (30.0, 0.0))
+    np.testing.assert_allclose(early, late, atol=1e-9)
+    assert late[0] < 1.7
+
+
+def test_memory_is_wiped_between_trials():
+    model = bicep_model()
+    both = model.predict(table(((0.0, 6.0, 2.0), (2.0, 5.0))))
+    alone = model.predict(table(((2.0, 5.0),)))
+    np.testing.assert_array_equal(both[3:], alone)
+    assert both[2] != alone[0]
+
+
+def test_force_table_is_the_first_stage_of_the_felt_voltage():
+    model = bicep_model(['supply_sag'])
+    voltage = np.array([1.0, 5.0, 2.0, 3.0])
+    run = Measurement.from_columns({'trial': np.zeros(4), 'step': np.arange(4),
+                                    'voltage': voltage, 'force': np.zeros(4)})
+    stage = bicep_model().force_stage
+    stage.reset()
+    np.testing.assert_allclose(model.predict(run),
+                               [stage.step(v * 8.0 / 8.4) for v in voltage], atol=1e-12)
+    before = model.force_stage.save()
+    model.predict(run)
+    assert model.force_stage.save() == before
+    changing = model.with_effects([effect_of(model, 'resistance_change')])
+    assert np.all(np.isfinite(changing.predict(run)))
+    with pytest.raises(ParameterError, match='no force stage'):
+        bicep_model(force_stage=None).predict(run)
+
+
+def test_an_arm_run_without_a_first_stage_ignores_the_load():
+    model = bicep_model(force_stage=None, load_name=None, mean_load=0.0)
+    voltage = np.array([1.0, 5.0, 2.0, 3.0])
+    stage = model.require_length_stage()
+    stage.step(0.0)
+    lengths = [stage.step(-v) for v in voltage]
+    np.testing.assert_allclose(GEOMETRY.length(model.predict(arm_run(voltage))), lengths, atol=2e-8)
+
+
+@pytest.mark.parametrize('x, expected', [
+    ([0.0, 1.0, 2.0, 1.0, 0.0], [1, 0, 1, 0, 1]), ([0.0, 1.0, 1.0, 0.0, 0.0], [1, 0, 1, 0, 1]),
+    ([0.0, 0.0, 1.0, 1.0, 2.0], [1, 0, 0, 0, 1]), ([3.0], [1]), ([2.0, 2.0], [1, 1])])
+def test_turns_are_where_the_direction_changes(x, expected):
+    assert turning_rows(np.array(x)).tolist() == [bool(value) for value in expected]
+
+
+@pytest.mark.parametrize('names', [
+    (), *((name,) for name in catalogue() if name not in WITH_TIME),
+    ('supply_sag', 'stress_dependent_strain', 'coulomb_friction', 'backlash')])
+def test_stride_is_exact_in_the_rows_it_visits(names):
+    model = bicep_model(names)
+    run = arm_run(VOLTAGE, 0.1)
+    full = Simulator(model, run).run(model.effects)
+    seen = []
+    strided = Simulator(model, run, stride=10).run(model.effects, seen)
+    (inputs, rows, count), = seen
+    assert count == len(VOLTAGE) and len(inputs) == len(rows) < 200
+    assert set(range(0, count, 10)) <= set(rows.tolist())
+    exact = 1e-9 if len(names) < 2 else 1e-7
+    np.testing.assert_allclose(strided[rows], full[rows], rtol=0.0, atol=exact)
+
+
+@pytest.mark.parametrize('name', [name for name in WITH_TIME if name != 'latency'])
+def test_stride_comes_close_where_time_counts(name):
+    model = bicep_model([name])
+    run = arm_run(VOLTAGE, 0.1, ambient_temperature=np.linspace(20.0, 30.0, len(VOLTAGE)))
+    full = Simulator(model, run).run(model.effects)
+    seen = []
+    strided = Simulator(model, run, stride=5).run(model.effects, seen)
+    if name in ('viscous_friction', 'inertia'):
+        np.testing.assert_array_equal(strided, full)
+    rows = seen[-1][1]
+    assert np.degrees(np.max(np.abs(strided - full)[rows])) < 0.1
+
+
+def test_a_settled_run_is_never_strided():
+    model = bicep_model()
+    run = arm_run(wandering_voltage(50))
+    np.testing.assert_array_equal(Simulator(model, run, stride=10).run([]), model.predict(run))
+
+
+def test_phase_is_in_agreement_with_the_response_it_causes():
+    model = bicep_model()
+    effect = effect_of(model, 'resistance_change', eta=0.05)
+    run = arm_run([3.5, 4.0, 2.5])
+    angles = Simulator(model, run).run([effect])
+    phase = model.martensite(GEOMETRY.length(angles))
+    assert np.all((phase > 0.0) & (phase < 1.0))
+    felt = np.array([3.5, 4.0, 2.5]) * np.sqrt(1.05 / (1.0 + 0.05 * phase))
+    np.testing.assert_allclose(model.predict(arm_run(felt)), angles, atol=math.radians(0.05))
+
+
+def test_martensite_is_the_long_phase_of_a_muscle_that_contracts():
+    model = bicep_model()
+    low, high = model.length_stage.output_range
+    assert model.martensite(high + 1.0) == 1.0 and model.martensite(low - 1.0) == 0.0
+    assert model.martensite(low + 0.25 * (high - low)) == pytest.approx(0.25)
+    assert bicep_model(sign=1).martensite(high) == 0.0
+    with pytest.raises(ModelFileError, match='no length stage'):
+        bicep_model(length_stage=None).martensite(0.0)
+
+
+def test_sensor_effects_reach_bench_tables():
+    run = table()
+    plain = bicep_model().predict(run)
+    late = bicep_model(['latency']).predict(run)
+    assert late[0] == plain[0]
+    assert late[1] == pytest.approx(plain[1] + (plain[0] - plain[1]) * 0.35 / 30.0)
+
+
+def test_muscle_says_what_scales_effects_refer_to():
+    surroundings = bicep_model().surroundings
+    assert surroundings._asdict() == {
+        'length': 0.27, 'load': 3.0, 'heat': 36.0, 'span': pytest.approx(0.0205),
+        'drive': 'voltage', 'load_name': 'force', 'response': 'length', 'cold': 0.0,
+        'drive_range': 6.0, 'sign': -1}
+    hot = bicep_model(drive='temperature', response='strain', geometry=None, sign=1,
+                      ranges={'temperature': (20.0, 150.0), 'strain': (0.0, 0.04)}).surroundings
+    assert (hot.length, hot.heat, hot.cold, hot.drive_range, hot.sign) == (
+        1.0, 150.0, 20.0, 130.0, 1)
+    assert bicep_model(geometry=None).surroundings.length == pytest.approx(20.0 * 0.0205)
+
+
+def test_unknown_method_is_refused():
+    with pytest.raises(ParameterError, match="must be preisach or linear, not 'magic'"):
+        bicep_model().predict(table(), 'magic')
+
+
+LINEAR = LinearModel(2.69, 0.88e-3, -0.15)
+
+
+def test_linear_model_is_that_of_the_paper():
+    assert LINEAR.force(2.0) == pytest.approx(2.69 * 2.0 - 0.15)
+    # L = k2 (F - k1 V - F0), k2 in mm/N
+    assert LINEAR.length(2.0, 9.0) == pytest.approx(0.88e-3 * (9.0 - 2.69 * 2.0 + 0.15))
+    assert LINEAR.length(LINEAR.drive_for_length(1e-3, 9.0), 9.0) == pytest.approx(1e-3)
+    assert LINEAR.length(LINEAR.drive_for_force(7.0), 7.0) == pytest.approx(0.0)
+    assert LINEAR.force(LINEAR.drive_for_force(7.0)) == pytest.approx(7.0)
+    assert LinearModel.from_dict(LINEAR.to_dict()) == LINEAR
+
+
+def test_linear_predictions_of_the_bench():
+    model = bicep_model(linear=LINEAR)
+    run = table()
+    np.testing.assert_allclose(model.predict(run, 'linear'),
+                               LINEAR.length(run.column('voltage'), 4.0))
+    force = Measurement.from_columns({'trial': np.zeros(2), 'step': np.arange(2),
+                                      'voltage': np.array([1.0, 2.0]), 'force': np.zeros(2)})
+    np.testing.assert_allclose(model.predict(force, 'linear'), LINEAR.force([1.0, 2.0]))
+    bare = Measurement.from_columns({'trial': np.zeros(2), 'voltage': np.array([1.0, 2.0]),
+                                     'length': np.zeros(2)})
+    np.testing.assert_allclose(model.predict(bare, 'linear'), LINEAR.length([1.0, 2.0], 0.0))
+
+
+def test_linear_prediction_of_the_arm_balances_it():
+    model = bicep_model(linear=LinearModel(2.69, 1.3e-3, 9.0))
+    voltage = np.array([1.0, 2.0, 3.0])
+    angles = model.predict(arm_run(voltage), 'linear')
+    for volts, angle in zip(voltage, angles):
+        expected = optimize.brentq(lambda theta, v=volts: float(
+            GEOMETRY.length(theta) - model.linear.length(v, GEOMETRY.force(theta))), 0.8, 2.6)
+        assert angle == pytest.approx(expected, abs=2e-5)
+    assert np.all(np.diff(angles) < 0.0)
+
+
+def test_linear_prediction_needs_a_linear_model():
+    with pytest.raises(ParameterError, match='no linear model'):
+        bicep_model(linear=None).predict(table(), 'linear')
+
+
+def test_strengths_cover_every_effect_of_these_tests():
+    assert set(WITH_TIME) <= set(STRENGTHS)
