@@ -75,6 +75,7 @@ class CompensatorNode(Node):
         self._controller = self._model.controller(arm=True)
         self._integral = AngleFeedback()
         self._timer = None
+        self._silent = True
         self._ambient = math.nan
         self._received = self._published = self._refused = self._repeated = 0
         self._corrections = 0
@@ -108,7 +109,7 @@ class CompensatorNode(Node):
             self.destroy_timer(self._timer)
             self._timer = None
         if repeated:
-            self._timer = self.create_timer(parameters['republish_period'], self._repeat)
+            self._timer = self.create_timer(0.5 * parameters['republish_period'], self._repeat)
 
     def _forget(self):
         self._wanted = None
@@ -130,7 +131,8 @@ class CompensatorNode(Node):
             return
         self._diagnostics.clear('reference')
         self._wanted, self._target = wanted, target
-        self._integral.begin(self._now())
+        if self._feedback:
+            self._integral.begin(self._now())
         self._published += self._apply(self._corrected(wanted))
 
     def _corrected(self, wanted):
@@ -170,13 +172,15 @@ class CompensatorNode(Node):
 
     def _publish(self, voltage):
         self._publisher.publish(Float64(data=voltage))
-        if self._timer is not None:
-            self._timer.reset()
+        self._silent = False
 
     def _repeat(self):
-        if self._wanted is not None:
+        """Publish when there was silence since the last look, half a period ago."""
+        if self._silent and self._wanted is not None:
             self._publish(self._controller.hold(self._now()))
             self._repeated += 1
+        else:
+            self._silent = True
 
     def _on_joint_states(self, message):
         angle = read_angle(message, self._joint)

@@ -5,8 +5,8 @@
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 # Targets, references and setpoints: each one moves the memory of the model and of the muscle, so
-# none may be lost or change places. The depth bridges a pause of 2 s at 500 messages a second.
-COMMANDS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+# none may be lost or change places. The depth bridges a pause of 20 s at 500 messages a second.
+COMMANDS = QoSProfile(depth=10000, reliability=ReliabilityPolicy.RELIABLE)
 
 # Measurements: reliable, because a recording or a prediction with gaps is worth less.
 MEASUREMENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
