@@ -185,6 +185,7 @@ def test_first_word_on_the_way_out_is_zero():
             until(lambda: far.board.duty > 0.2, 'the voltage')
             said = len(far.heard)
         until(lambda: not far.board.enabled, 'the end')
+        board.stop()
         last = [(frame.kind, frame.fields.get('duty')) for frame in kinds(far.heard[said:])]
         zero = last.index(('set', '0.00000'))
         assert last[zero:].count(('disable', None)) >= 1

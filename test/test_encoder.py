@@ -96,6 +96,15 @@ def test_a_jump_that_stays_is_taken_but_never_hidden():
     assert encoder.update(0.4, 5010).fault == ''
 
 
+def test_two_wild_samples_that_differ_are_both_not_believed():
+    encoder = Encoder(maximum_speed=10.0)
+    encoder.update(10.0, 100)
+    encoder.update(10.1, 5000)
+    assert not encoder.update(10.2, 8000).fresh
+    assert not encoder.update(10.3, 8000 + int(10.0 * 0.1 / COUNT) + 3).fresh
+    assert encoder.update(10.4, 110).fault == ''
+
+
 def test_fastest_possible_turn_is_no_fault():
     encoder = Encoder(maximum_speed=10.0)
     most = int(10.0 * 0.1 / COUNT)
@@ -137,9 +146,17 @@ def test_index_puts_the_angle_right():
     assert reading.fault == ''
     assert reading.angle == pytest.approx(1.0 + 10 * COUNT, abs=COUNT)
     assert reading.velocity == pytest.approx(60 * COUNT / 0.1)
+    assert encoder.update(0.15, 80, 1, 50).velocity == pytest.approx(80 * COUNT / 0.15)
     reading = encoder.update(0.2, 100, 2, 30)
     assert 'put right' in reading.fault
     assert reading.angle == pytest.approx(1.0 + 70 * COUNT, abs=COUNT)
+
+
+def test_angle_at_the_index_holds_whatever_the_zero():
+    for direction in (1, -1):
+        encoder = Encoder(direction=direction, zero=0.7, index='home', index_angle=1.0)
+        encoder.update(0.0, 0)
+        assert encoder.update(0.1, 50, 1, 50).angle == pytest.approx(1.0, abs=COUNT)
 
 
 def test_index_ends_the_doubt_after_a_restart():

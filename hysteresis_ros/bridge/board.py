@@ -203,7 +203,11 @@ class Board:
             thread.start()
 
     def stop(self):
-        """Switch the output off, wait a moment until the board says so, and close the port."""
+        """
+        Switch the output off, wait a moment until the board says so, and close the port.
+
+        It may be called again; `start` may not.
+        """
         with self._wake:
             self._wanted = False
             self._target = None
@@ -218,6 +222,7 @@ class Board:
             if thread.is_alive():
                 thread.join(2.0)
         self._link.close()
+        self._online = False
 
     def set_voltage(self, voltage):
         """
@@ -259,6 +264,7 @@ class Board:
         with self._wake:
             self._wanted = wanted
             self._target = None
+            self._limit = ''
             self._tell_writer()
 
     def forgive(self):

@@ -142,6 +142,11 @@ class BridgeNode(Node):
         """Write zero to the board, before anything else ends."""
         self._board.stop()
 
+    def destroy_node(self):
+        """Stop the board, whose thread publishes, before the publishers go."""
+        self._board.stop()
+        super().destroy_node()
+
     def _configure(self, parameters):
         self._board.pwm = _pwm(parameters)
 
