@@ -7,8 +7,8 @@ import re
 from hypothesis import given, settings, strategies
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement, settled_rows
+from hysteresis_ros.measurements.holds import holds
 from hysteresis_ros.measurements.quantities import shown, unit_of
-from hysteresis_ros.measurements.table import holds
 import numpy as np
 import pytest
 

@@ -9,8 +9,8 @@ from hysteresis_ros.diagnosis.metrics import Errors, errors, finite, Floor, nois
 from hysteresis_ros.diagnosis.signals import signals_of
 from hysteresis_ros.diagnosis.where import blocks_of, number, regions
 from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.measurements.holds import hold_ends, mean_of_windows
 from hysteresis_ros.measurements.quantities import QUANTITIES, shown
-from hysteresis_ros.measurements.table import hold_ends, mean_of_windows
 import numpy as np
 
 FAR_OUTSIDE = 30.0

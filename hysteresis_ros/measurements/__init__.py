@@ -7,9 +7,9 @@ from pathlib import Path
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.bag import is_bag, read_bag
 from hysteresis_ros.measurements.csv import read_csv, read_reference, write_csv
+from hysteresis_ros.measurements.holds import settled_rows
 from hysteresis_ros.measurements.quantities import QUANTITIES, Quantity
-from hysteresis_ros.measurements.table import (
-    Measurement, MeasurementWarning, settled_rows, SETTLED_HOLD)
+from hysteresis_ros.measurements.table import Measurement, MeasurementWarning, SETTLED_HOLD
 
 __all__ = [
     'Measurement', 'MeasurementWarning', 'QUANTITIES', 'Quantity', 'SETTLED_HOLD', 'read_bag',
