@@ -108,7 +108,7 @@ def extend(model, names, train, test=()) -> Extension:
         models.append((f'+ {kind.id}', problem.completed([*base.effects, *known])))
     fit = fitter.fit(base.effects, known, evaluations=EVALUATIONS)
     added = fitter.with_intervals(fit)
-    extended = _stamped(problem.completed([*base.effects, *added]), added, train)
+    extended = _stamped(problem.completed([*base.effects, *added]), added, train, problem.kind)
     models[-1] = (models[-1][0], extended)
     steps = [(name, rmse(one, judged)) for name, one in models]
     # Where weights are refitted, the fair base is one that was refitted to the same rows.
@@ -147,11 +147,12 @@ def _best(fitter, fixed, known, effect):
     return min(fits, key=lambda fit: fitter.error(fit.predicted))
 
 
-def _stamped(model, added, train):
+def _stamped(model, added, train, kind):
     """Note in the provenance what was added from which recordings."""
     provenance = dict(model.provenance)
     history = list(provenance.get('extended', []))
     history.append({
+        'kind': kind,
         'effects': [effect.id for effect in added],
         'data': [{'source': str(m.source).rsplit('/', 1)[-1],
                   'sha256': m.digest or hashlib.sha256(
