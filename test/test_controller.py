@@ -160,7 +160,7 @@ def test_hold_leaves_the_memory_of_the_hysteresis_alone():
     voltages = {controller.hold(0.5 * n) for n in range(1, 20)}
     assert len(voltages) > 1
     after = controller.save()
-    for part in ('first', 'muscles', 'force', 'target'):
+    for part in ('first', 'muscles', 'force', 'targets'):
         assert after[part] == memory[part]
     assert after['effects'][1] == memory['effects'][1]
 
@@ -241,8 +241,11 @@ def test_memory_that_does_not_fit_is_refused_and_changes_nothing():
     controller = bicep_model(['thermal_lag']).controller()
     controller.setpoint(*controller.reference(1.5), 1.0)
     good = controller.save()
-    others = [{}, {**good, 'voltage': math.nan}, {**good, 'muscles': []},
-              {**good, 'effects': [[], []]}, {**good, 'first': None}, {**good, 'travel': 'far'},
+    others = [{}, {**good, 'ambient': math.nan}, {**good, 'muscles': []},
+              {**good, 'effects': [[], []]}, {**good, 'first': None}, {**good, 'pacing': {}},
+              {**good, 'pacing': {**good['pacing'], 'travel': 'far'}},
+              {**good, 'pacing': {**good['pacing'], 'drive': math.inf}},
+              {**good, 'targets': {**good['targets'], 'mood': 1.0}},
               bicep_model().controller().save(), None]
     for state in others:
         with pytest.raises(ParameterError, match='saved memory does not fit') as error:

@@ -19,7 +19,7 @@ from scipy import optimize
 
 from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.bicep.geometry import BicepGeometry
-from hysteresis_ros.effects.base import Statics
+from hysteresis_ros.effects.stages import Statics
 
 # Between two angles of the grid the linkage is a straight line, which costs less than 1e-6 rad.
 GRID = math.radians(0.1)
@@ -268,7 +268,7 @@ class _Line:
         self.strain = None if np.all(scale == 1.0) else (1.0 / scale).tolist()
 
     def place(self, demand, offset):
-        """Interval on the grid, and share of it, for what the transformation gives."""
+        """Return interval on the grid, and share of it, for what the transformation gives."""
         grid, strain = self.demand, self.strain
         if strain is None or offset == 0.0:
             demand += offset
@@ -286,7 +286,7 @@ class _Line:
         return k, 1.0 if demand >= above else (demand - below) / (above - below)
 
     def demand_at(self, k, share, offset):
-        """What the transformation has to give at a place of the grid: `place` inverted."""
+        """Return what the transformation has to give at a place of the grid: `place` inverted."""
         grid, strain = self.demand, self.strain
         demand = grid[k - 1] + share * (grid[k] - grid[k - 1])
         if strain is None:

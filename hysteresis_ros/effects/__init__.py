@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The catalogue of physical effects that a model may be missing."""
 
-from hysteresis_ros.effects.base import (
-    STAGES, DriveEffect, Effect, Inputs, MaterialEffect, MechanismEffect, Parameter, SensorEffect,
-    Statics, Surroundings)
+from hysteresis_ros.effects.base import Effect, Inputs, Parameter, STAGES, Surroundings
 from hysteresis_ros.effects.catalogue import catalogue, effect_class
+from hysteresis_ros.effects.stages import (
+    DriveEffect, MaterialEffect, MechanismEffect, SensorEffect, Statics)
 
 __all__ = [
     'STAGES', 'DriveEffect', 'Effect', 'Inputs', 'MaterialEffect', 'MechanismEffect', 'Parameter',

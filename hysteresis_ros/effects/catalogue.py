@@ -7,8 +7,9 @@ import inspect
 from importlib import metadata
 
 from hysteresis_ros.effects import electrical, material, mechanism, sensor, thermal
-from hysteresis_ros.effects.base import (
-    STAGES, DriveEffect, Effect, MaterialEffect, MechanismEffect, SensorEffect)
+from hysteresis_ros.effects.base import Effect, STAGES
+from hysteresis_ros.effects.stages import (
+    DriveEffect, MaterialEffect, MechanismEffect, SensorEffect)
 from hysteresis_ros.errors import ParameterError
 
 ENTRY_POINT_GROUP = 'hysteresis_ros.effects'

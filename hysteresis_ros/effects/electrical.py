@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import DriveEffect, Parameter
+from hysteresis_ros.effects.base import Parameter
+from hysteresis_ros.effects.stages import DriveEffect
 
 ELECTRIC_DRIVES = ('voltage', 'current')
 

@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import MaterialEffect, Parameter, Surroundings
+from hysteresis_ros.effects.base import Parameter, Surroundings
+from hysteresis_ros.effects.stages import MaterialEffect
 
 
 class StressDependence(MaterialEffect):

@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import MechanismEffect, Parameter, Statics
+from hysteresis_ros.effects.base import Parameter
+from hysteresis_ros.effects.stages import MechanismEffect, Statics
 
 
 def add_moment(statics: Statics, moment) -> Statics:

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Parameter, SensorEffect
+from hysteresis_ros.effects.base import Parameter
+from hysteresis_ros.effects.stages import SensorEffect
 
 
 class EncoderOffset(SensorEffect):

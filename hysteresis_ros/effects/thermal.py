@@ -15,7 +15,8 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import DriveEffect, Parameter
+from hysteresis_ros.effects.base import Parameter
+from hysteresis_ros.effects.stages import DriveEffect
 
 
 class ThermalEffect(DriveEffect):

@@ -11,16 +11,16 @@ import numpy as np
 from scipy import optimize
 
 from hysteresis_ros.bicep.geometry import Reference
-from hysteresis_ros.effects import Inputs, Statics
+from hysteresis_ros.effects import Inputs
 from hysteresis_ros.effects.thermal import LatentHeat
-from hysteresis_ros.errors import ParameterError, RangeError
+from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.muscles import Muscles
+from hysteresis_ros.model.pacing import Pacing
+from hysteresis_ros.model.targets import Targets
 
 # Passes that bring a clipped drive into agreement with the phase that it causes.
 PHASE_PASSES = 20
-# What a longer time between two calls of `hold` counts in the next one.
-FADING = 0.9
 
 
 class Setpoint(NamedTuple):
@@ -86,10 +86,6 @@ class Controller:
         If the limits make no sense.
     """
 
-    # What is remembered beside the operators and the effects.
-    _MEMORY = ('_fresh', '_arm', '_voltage', '_travel', '_angle', '_direction', '_time', '_period',
-               '_deadline', '_target', '_phase', '_ambient')
-
     def __init__(self, model, voltage_limits=None, dead_band: float = 0.0,
                  horizon: float = math.inf, arm: bool = False):
         self.model = model
@@ -97,7 +93,6 @@ class Controller:
         if not self.limits[0] < self.limits[1]:
             raise ParameterError(f'the drive limits {self.limits} have to be a lower and an upper')
         self.dead_band = dead_band
-        self.horizon = horizon
         usable = [effect for effect in model.effects
                   if effect.invertible or effect.stage in ('mechanism', 'sensor')]
         # What the transformation takes up on the way is not foreseen: overdriven as by a mere lag,
@@ -111,10 +106,21 @@ class Controller:
         self._force = copy.deepcopy(model.force_stage)
         self._muscles = (None if model.length_stage is None else
                          Muscles(model.require_length_stage(), model.sign, self._chain.offsets))
+        self._pacing = Pacing(self._chain, self._clip, self._inputs, horizon)
+        self._targets = (None if model.geometry is None else
+                         Targets(model.geometry, self._chain, lambda: self._at_rest()[0]))
         self._rest = None
-        self._travel = 0.0
         self._arm = arm
         self.reset()
+
+    @property
+    def horizon(self) -> float:
+        """Time [s] within which a lagging muscle is to reach its heat."""
+        return self._pacing.horizon
+
+    @horizon.setter
+    def horizon(self, value: float) -> None:
+        self._pacing.horizon = value
 
     def reset(self) -> None:
         """Forget the history: the muscle was heated and cooled. What has worn it stays."""
@@ -129,12 +135,11 @@ class Controller:
         if self._force is not None:
             self._force.reset()
             self._force.step(cold)
+        if self._targets is not None:
+            self._targets.reset()
+        self._pacing.reset(cold, heat)
         self._fresh = True
-        self._voltage = cold
-        self._angle = self._time = self._ambient = None
-        self._direction = self._period = self._deadline = 0.0
-        self._target = heat
-        self._phase = 1.0
+        self._ambient = None
 
     def save(self) -> dict:
         """Return the memory as plain types, fit for JSON and YAML."""
@@ -142,7 +147,9 @@ class Controller:
                 'muscles': self._muscles.save() if self._muscles is not None else None,
                 'force': self._force.save() if self._force is not None else None,
                 'effects': [self._chain.save(), self._steady.save()],
-                **{name.strip('_'): getattr(self, name) for name in self._MEMORY}}
+                'targets': self._targets.save() if self._targets is not None else {},
+                'pacing': self._pacing.save(),
+                'fresh': self._fresh, 'arm': self._arm, 'ambient': self._ambient}
 
     def restore(self, state: Mapping) -> None:
         """
@@ -155,6 +162,10 @@ class Controller:
         """
         before = self.save()
         try:
+            for part in (state['targets'], state['pacing'], {'ambient': state['ambient']}):
+                for name, value in part.items():
+                    if value is not None and not math.isfinite(value):
+                        raise ValueError(f'{name} is {value}')
             self._take(state)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             self._take(before)
@@ -168,11 +179,11 @@ class Controller:
             self._force.restore(state['force'])
         for chain, entry in zip((self._chain, self._steady), state['effects'], strict=True):
             chain.restore(entry)
-        for name in self._MEMORY:
-            value = state[name.strip('_')]
-            if value is not None and not math.isfinite(value):
-                raise ValueError(f'{name.strip("_")} is {value}')
-            setattr(self, name, value)
+        if self._targets is not None:
+            self._targets.restore(**state['targets'])
+        self._pacing.restore(**state['pacing'])
+        self._fresh, self._arm = bool(state['fresh']), bool(state['arm'])
+        self._ambient = state['ambient']
 
     def reference(self, theta: float) -> Reference:
         """
@@ -194,41 +205,13 @@ class Controller:
         ------
         RangeError
             If the arm cannot be held there; nothing is remembered of that target.
+        ParameterError
+            If the model has no arm.
         """
-        geometry = self.model.require_geometry()
-        geometry.check_angle(theta)
-        before = self._chain.save()
-        try:
-            true = theta
-            for effect in reversed(self._chain.sensor):
-                true = effect.inverse(true)
-            geometry.check_angle(true)
-            found = self._reference(geometry, theta, true)
-        except RangeError:
-            self._chain.restore(before)
-            raise
+        self.model.require_geometry()
+        found = self._targets.reference(theta)
         self._arm = True
         return found
-
-    def _reference(self, geometry, theta, true):
-        statics = Statics.of(geometry, np.array([true]))
-        for effect in self._chain.mechanism:
-            statics = effect.forward(statics, geometry)
-        leverage = geometry.muscle_count * float(statics.moment_arm[0])
-        moment = float(statics.moment[0])
-        if leverage <= 0.0:
-            raise RangeError(f'target angle {theta:.4f} rad lies beyond a dead centre of the arm')
-        if moment < 0.0:
-            raise RangeError(f'nothing pulls the arm to the target angle {theta:.4f} rad; the '
-                             'muscle would have to push')
-        friction = sum(effect.resistance()[0] for effect in self._chain.mechanism)
-        if friction > 0.0:
-            start = self._at_rest()[0] if self._angle is None else self._angle
-            if true != start:
-                self._direction = math.copysign(1.0, true - start)
-        self._angle = true
-        force = max(moment - self._direction * friction, 0.0) / leverage
-        return Reference(float(statics.length[0]), force)
 
     def _at_rest(self):
         """Angle of the cold arm, and what its muscles' memories start from."""
@@ -275,7 +258,7 @@ class Controller:
         applied = float(self._chain.to_drive(self._steady.step(drive, inputs)))
         expected = self._force.step(applied) if commit else self._force.peek(applied)
         if commit:
-            self._apply(drive)
+            self._pacing.apply(drive)
         saturated = found.saturated or clipped
         reason = (f'force {force:.4g} N is outside {low:.4g} to {high:.4g} N or beyond the drive '
                   'limits' if saturated else '')
@@ -321,7 +304,7 @@ class Controller:
         return found
 
     def _setpoint(self, length, force, time, ambient):
-        self._advance(time)
+        self._pacing.advance(time)
         load = float(self._chain.load_inside(np.float64(force))) if self._first.loaded else 0.0
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
@@ -362,9 +345,9 @@ class Controller:
             return self.model.sign * (
                 self._outcome(drive, force, load, inputs).length - length)
 
-        here = error(self._voltage) if low <= self._voltage <= high else math.inf
-        if abs(here) <= self.dead_band:
-            return self._voltage, False
+        here = self._pacing.drive
+        if low <= here <= high and abs(error(here)) <= self.dead_band:
+            return here, False
         margin = 1e-9 * self._chain.surroundings.span
         at_low, at_high = error(low), error(high)
         if at_low >= 0.0:
@@ -392,14 +375,10 @@ class Controller:
         self._muscles.step(outcome.muscles)
         self._steady.advance(drive, outcome.heat, self._worn(inputs, drive))
         self._fresh = False
-        self._target, self._phase = outcome.heat, inputs.phase
         if math.isfinite(inputs.ambient):
             self._ambient = inputs.ambient
-        if time is not None and math.isfinite(self.horizon):
-            self._deadline, self._period = time + self.horizon, 0.0
-            drive = self._towards(outcome.heat, inputs.phase, self.horizon)
-        self._apply(drive)
-        return drive
+        self._pacing.begin(drive, outcome.heat, inputs.phase, time)
+        return self._pacing.drive
 
     def hold(self, time: float) -> float:
         """
@@ -413,53 +392,30 @@ class Controller:
         time : float
             Now [s].
         """
-        # The next call may be late: longer than a period overdriven, the muscle would swing.
-        self._period = max(self._advance(time), FADING * self._period)
-        if math.isfinite(self.horizon) and not self._fresh and self._time is not None:
-            remaining = max(self._deadline - self._time, self._period)
-            self._apply(self._towards(self._target, self._phase, remaining))
-        return self._voltage
+        if self._fresh:
+            self._pacing.advance(time)
+        else:
+            self._pacing.hold(time)
+        return self._pacing.drive
 
-    def _towards(self, heat, phase, duration):
-        """Drive that brings the muscle to a heat within a time [s], as far as the limits let."""
-        return self._clip(self._chain.inverse(heat, self._inputs(duration, phase, math.nan)))[0]
-
-    def _apply(self, drive):
-        self._travel += abs(drive - self._voltage)
-        self._voltage = drive
-
-    def _advance(self, time):
-        """Let the lagging muscle feel what was applied until now, and return for how long [s]."""
-        if time is None or not math.isfinite(time):
-            return 0.0
-        if self._time is None:
-            self._chain.step(self._voltage, self._inputs(0.0, self._phase, math.nan))
-            self._time = time
-        elapsed = time - self._time
-        if elapsed <= 0.0:
-            return 0.0
-        self._chain.step(self._voltage, self._inputs(elapsed, self._phase, math.nan))
-        self._time = time
-        return elapsed
-
-    def _inputs(self, step, phase, ambient) -> Inputs:
+    def _inputs(self, step, phase, ambient=math.nan) -> Inputs:
         if not math.isfinite(ambient) and self._ambient is not None:
             ambient = self._ambient
         return Inputs(0.0, 0.0, step, ambient, phase, 0.0)
 
     def _worn(self, inputs, drive):
         """Return the inputs with the cycles that there will be after `drive`."""
-        travel = self._travel + abs(drive - self._voltage)
+        travel = self._pacing.travel + abs(drive - self._pacing.drive)
         return inputs._replace(cycles=travel / (2.0 * self.model.drive_range))
 
     def _no_number(self):
-        return Setpoint(self._clip(self._voltage)[0], True, math.nan, math.nan,
+        return Setpoint(self._clip(self._pacing.drive)[0], True, math.nan, math.nan,
                         'the reference is not a finite number')
 
     def _clip(self, drive: float) -> tuple[float, bool]:
         low, high = self.limits
         if not math.isfinite(drive):
-            return min(max(self._voltage, low), high), True
+            return min(max(self._pacing.drive, low), high), True
         margin = 1e-9 * max(abs(low), abs(high)) if math.isfinite(high) else 0.0
         clipped = min(max(drive, low), high)
         return clipped, abs(clipped - drive) > margin

@@ -1,0 +1,200 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What an effect can be, by the stage at which it acts: drive, material, mechanism or sensor."""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from hysteresis_ros.effects.base import Effect, Inputs, Surroundings
+
+
+class DriveEffect(Effect):
+    """
+    Effect between the drive that was set and the steady-state drive that the muscle feels.
+
+    An electrical effect maps the drive, a thermal one the heat (the drive squared where it is a
+    voltage or a current, the drive itself where it is a temperature, pressure or power). One
+    without a past defines `forward`, one with a past `step` and `start`; the other follows.
+    """
+
+    # Heat exchange with the air over that of the bench, which every lag of the model follows.
+    exchange: float = 1.0
+
+    def forward(self, signal, inputs: Inputs, surroundings: Surroundings):
+        """
+        Map the signal of one trial.
+
+        Parameters
+        ----------
+        signal : ndarray, shape (rows,)
+            Drive or heat; an effect without a past takes a scalar as well.
+        inputs : Inputs
+            Of the same shape.
+        surroundings : Surroundings
+            The muscle.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+        """
+        self.start()
+        steps = np.broadcast_to(inputs.step, np.shape(signal)).tolist()
+        phases = np.broadcast_to(inputs.phase, np.shape(signal)).tolist()
+        return np.array([self.step(value, step, phase, surroundings)
+                         for value, step, phase in zip(signal.tolist(), steps, phases)])
+
+    def step(self, value: float, step: float, phase: float,
+             surroundings: Surroundings) -> float:
+        """Advance by `step` [s] under the constant input `value`; `phase` as in `Inputs`."""
+        inputs = Inputs(0.0, 0.0, step, math.nan, phase, 0.0)
+        return float(self.forward(value, inputs, surroundings))
+
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
+        """
+        Return the input for which the output becomes `signal`; identity if not possible.
+
+        For an effect with a past: the input that, held for ``inputs.step`` seconds, brings the
+        output there.
+        """
+        return signal
+
+
+class MaterialEffect(Effect):
+    """
+    Effect on the muscle's relation ``L = L0 + S(F) f (H2[s (x - c F)] - L0) + e(F) + o``.
+
+    The transformation is H2 of the drive x shifted by the load F; S scales its strain, e is what
+    the load alone stretches, f and o are what time and use do. Each method has a neutral default.
+    Loads are per muscle, scalars or arrays.
+    """
+
+    stage = 'material'
+    # Load per heat that takes the place of the first stage; 0 leaves it as it is.
+    load_per_heat: float = 0.0
+    # Excess length [m] of each parallel muscle.
+    offsets: tuple = (0.0,)
+
+    def shift_load(self, load, surroundings: Surroundings):
+        """Return what is added to the load inside the transformation, in units of the load."""
+        return 0.0 * load
+
+    def scale(self, load, surroundings: Surroundings):
+        """Return S, the factor on the transformation strain under `load`."""
+        return 1.0 + 0.0 * load
+
+    def stretch(self, load, surroundings: Surroundings):
+        """Return e, the elongation under `load` that does not depend on the transformation."""
+        return 0.0 * load
+
+    def drift(self, drive, heat, inputs: Inputs, surroundings: Surroundings):
+        """
+        Return what time and history add in one trial.
+
+        Parameters
+        ----------
+        drive, heat : ndarray, shape (rows,)
+            The drive that was set and the heat that the muscle feels.
+        inputs : Inputs
+            Of the same shape.
+        surroundings : Surroundings
+            The muscle.
+
+        Returns
+        -------
+        offset, factor : ndarray, shape (rows,)
+            o in the response's unit, and f.
+        """
+        if type(self).advance is MaterialEffect.advance:
+            return np.zeros(len(drive)), np.ones(len(drive))
+        self.start()
+        columns = [np.broadcast_to(column, np.shape(drive)).tolist()
+                   for column in (drive, heat, *inputs)]
+        added = [self.advance(value, felt, Inputs(*row), surroundings)
+                 for value, felt, *row in zip(*columns)]
+        return tuple(np.array(added, dtype=float).reshape(-1, 2).T)
+
+    def advance(self, drive: float, heat: float, inputs: Inputs,
+                surroundings: Surroundings) -> tuple[float, float]:
+        """Return `drift` of the next row; an effect with a past defines this and `start`."""
+        if type(self).drift is MaterialEffect.drift:
+            return 0.0, 1.0
+        offset, factor = self.drift(np.array([drive]), np.array([heat]),
+                                    Inputs(*(np.array([value]) for value in inputs)), surroundings)
+        return float(offset[0]), float(factor[0])
+
+
+@dataclasses.dataclass
+class Statics:
+    """
+    The arm at rest on a grid of angles: what the linkage asks of each muscle.
+
+    All arrays have shape (n,): `theta` [rad], elongation `length` [m], `moment_arm` [m], the
+    total `moment` [N m] that the muscles have to hold, and `upright` [rad], the angle between the
+    forearm and what really is upwards, along which weights pull.
+    """
+
+    theta: np.ndarray
+    length: np.ndarray
+    moment_arm: np.ndarray
+    moment: np.ndarray
+    upright: np.ndarray
+
+    @classmethod
+    def of(cls, geometry, theta: np.ndarray) -> 'Statics':
+        """Return the arm that the geometry describes, without any effect."""
+        return cls(theta, geometry.length(theta), geometry.moment_arm(theta),
+                   geometry.load_moment(theta), theta)
+
+
+class MechanismEffect(Effect):
+    """Effect on the arm: what it asks of the muscle at rest, and what resists its motion."""
+
+    stage = 'mechanism'
+
+    def forward(self, statics: Statics, geometry) -> Statics:
+        """Return the arm at rest with the effect; by default unchanged."""
+        return statics
+
+    def resistance(self) -> tuple[float, float, float]:
+        """
+        Return what resists motion.
+
+        Returns
+        -------
+        tuple of float
+            Coulomb moment [N m], viscous coefficient [N m s/rad], moment of inertia [kg m^2].
+        """
+        return 0.0, 0.0, 0.0
+
+
+class SensorEffect(Effect):
+    """
+    Effect between the true response and the measured one.
+
+    One without a past defines `forward` or `step`, one with a past `step` and `start`.
+    """
+
+    stage = 'sensor'
+    kinds = ('arm', 'bench')
+
+    def forward(self, response, inputs: Inputs):
+        """Map the response of one trial, shape (rows,)."""
+        if type(self).step is SensorEffect.step:
+            return response
+        self.start()
+        steps = np.broadcast_to(inputs.step, np.shape(response)).tolist()
+        return np.array([self.step(value, step)
+                         for value, step in zip(response.tolist(), steps)])
+
+    def step(self, value: float, step: float) -> float:
+        """Advance by one sample taken `step` seconds after the one before."""
+        if type(self).forward is SensorEffect.forward:
+            return value
+        inputs = Inputs(*(np.array([entry]) for entry in (0., 0., step, math.nan, math.nan, 0.)))
+        return float(self.forward(np.array([value]), inputs)[0])
+
+    def inverse(self, response: float) -> float:
+        """Return the true response that is measured as `response`."""
+        return response

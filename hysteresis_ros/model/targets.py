@@ -1,0 +1,87 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""From a target angle to what each muscle has to do, effects of arm and sensor undone."""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.bicep.geometry import Reference
+from hysteresis_ros.effects import Statics
+from hysteresis_ros.errors import RangeError
+
+
+class Targets:
+    """
+    The arm's inverse: target angle to elongation and force (Eqs. 21 and 22).
+
+    Parameters
+    ----------
+    geometry : BicepGeometry
+        The linkage.
+    chain : Chain
+        Effects of the model: those of the mechanism and of the sensor count here.
+    angle_at_rest : callable
+        Gives the angle [rad] from which the cold arm starts.
+    """
+
+    def __init__(self, geometry, chain, angle_at_rest):
+        self._geometry = geometry
+        self._chain = chain
+        self._angle_at_rest = angle_at_rest
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the targets before: the arm is cold."""
+        self._angle = None
+        self._direction = 0.0
+
+    def save(self) -> dict:
+        """Return what is remembered of the targets before, as plain types."""
+        return {'angle': self._angle, 'direction': self._direction}
+
+    def restore(self, angle: float | None, direction: float) -> None:
+        """Take back what `save` returned."""
+        self._angle, self._direction = angle, direction
+
+    def reference(self, theta: float) -> Reference:
+        """
+        Return elongation [m] and tension [N] of one muscle for a target angle [rad].
+
+        Raises
+        ------
+        RangeError
+            If the arm cannot be held there; nothing is remembered of that target.
+        """
+        self._geometry.check_angle(theta)
+        before = self._chain.save()
+        try:
+            true = theta
+            for effect in reversed(self._chain.sensor):
+                true = effect.inverse(true)
+            self._geometry.check_angle(true)
+            return self._hold(theta, true)
+        except RangeError:
+            self._chain.restore(before)
+            raise
+
+    def _hold(self, theta, true):
+        geometry = self._geometry
+        statics = Statics.of(geometry, np.array([true]))
+        for effect in self._chain.mechanism:
+            statics = effect.forward(statics, geometry)
+        leverage = geometry.muscle_count * float(statics.moment_arm[0])
+        moment = float(statics.moment[0])
+        if leverage <= 0.0:
+            raise RangeError(f'target angle {theta:.4f} rad lies beyond a dead centre of the arm')
+        if moment < 0.0:
+            raise RangeError(f'nothing pulls the arm to the target angle {theta:.4f} rad; the '
+                             'muscle would have to push')
+        friction = sum(effect.resistance()[0] for effect in self._chain.mechanism)
+        if friction > 0.0:
+            start = self._angle_at_rest() if self._angle is None else self._angle
+            if true != start:
+                self._direction = math.copysign(1.0, true - start)
+        self._angle = true
+        force = max(moment - self._direction * friction, 0.0) / leverage
+        return Reference(float(statics.length[0]), force)
