@@ -6,6 +6,7 @@
 PYTHON ?= python3
 CONSTRAINTS ?=
 DEMO_ARGS ?=
+HIDDEN_ARGS ?=
 PYTEST_ARGS ?=
 
 # The wheels of ROS 2 set this variable, and with it the library path, for one environment only.
@@ -59,7 +60,7 @@ help:
 	@echo 'make build      the workspace alone; then: . install/local_setup.sh'
 	@echo 'make clean      remove all that make made'
 	@echo 'PYTHON= chooses the interpreter, CONSTRAINTS= a pip constraints file,'
-	@echo 'DEMO_ARGS= the options of `hysteresis demo`, PYTEST_ARGS= those of pytest.'
+	@echo 'DEMO_ARGS=, PYTEST_ARGS=, HIDDEN_ARGS= are passed on.'
 
 # An environment holds absolute paths, so a moved checkout needs a new one, as another Python does.
 IDENTITY := $(CURDIR) $(PYTHON) $(EXTRAS) $(CONSTRAINTS)
@@ -96,7 +97,7 @@ benchmark: build
 	@$(IN_WORKSPACE) $(VENV)/bin/python -m benchmark benchmark.json
 
 hidden: build
-	@$(IN_WORKSPACE) $(VENV)/bin/python tools/hidden.py hidden.json
+	@$(IN_WORKSPACE) $(VENV)/bin/python tools/hidden.py hidden.json $(HIDDEN_ARGS)
 
 clean:
 	rm -rf .venv* .workspace* build install log dist demo *.egg-info
