@@ -14,11 +14,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy import optimize
 
-from hysteresis_ros.identification.operators import fit_preisach, thinned
-from hysteresis_ros.operators import Linear, Preisach
+from hysteresis_ros.identification.nonnegative import quick_weights
+from hysteresis_ros.identification.operators import preisach_rows, smoothness, thinned
+from hysteresis_ros.operators import Linear, Preisach, cell_areas
 
 # Levels, strength and rows of the second stages that H1's candidates are compared by.
-LEVELS, STRENGTH, MOST_ROWS = 14, 1e-4, 600
+LEVELS, STRENGTH, MOST_ROWS = 14, 1e-6, 600
 # Logarithms of the slope, in ranges of load over range of drive, and exponents that are tried.
 SLOPES = np.linspace(-2.5, 4.0, 14)
 EXPONENTS = (1.0, 2.0)
@@ -56,7 +57,7 @@ def first_stage_from_lengths(
         lengths: Sequence[np.ndarray], cold: float, levels: int,
         squared: bool) -> Linear | Preisach:
     """
-    Find the H1 with which H2 predicts the lengths of trials that it was not fitted to best.
+    Find the H1 with which H2 explains the lengths best, those under loads held out included.
 
     Parameters
     ----------
@@ -85,6 +86,7 @@ def first_stage_from_lengths(
     # Loads that do not differ still say how large a load is.
     usual = float(np.ptp(everything)) or float(np.max(np.abs(everything))) or 1.0
     usual /= upper - lower
+    held = _between(np.array([np.mean(load) for load in loads]), np.ptp(everything))
 
     def stage(vector: np.ndarray) -> Linear | Preisach:
         slope = usual * float(np.exp(np.clip(vector[0], SLOPES[0] - 1.0, SLOPES[-1] + 1.0)))
@@ -96,10 +98,34 @@ def first_stage_from_lengths(
         parts = [load - first.simulate(drive) for load, drive in zip(loads, drives)]
         nodes = np.linspace(min(part.min() for part in parts),
                             max(part.max() for part in parts), LEVELS + 1)
-        _, fit = fit_preisach(parts, target, nodes, groups=groups, strengths=(STRENGTH,))
-        return float(fit.validation[0])
+        rows = np.concatenate([preisach_rows(nodes, part, True)[1:] for part in parts])
+        scale = np.append(cell_areas(nodes), np.diff(nodes))
+        root = smoothness(nodes, reversible=True)
+
+        def rmse(fitted, predicted):
+            weights, bias, _ = quick_weights(
+                rows[fitted], target[fitted], scale, STRENGTH * root.T @ root)
+            return float(np.sqrt(np.mean((rows @ weights + bias - target)[predicted] ** 2)))
+        all_rows = np.ones(len(target), dtype=bool)
+        result = rmse(all_rows, all_rows)
+        if held:
+            # Both count: few loads may agree by chance, and rows alone may be fitted by anything.
+            apart = [rmse(~out, out) for out in (np.isin(groups, trials) for trials in held)]
+            result *= float(np.sqrt(np.mean(np.square(apart))))
+        return result
 
     return stage(_search(score, EXPONENTS if squared else (1.0,)))
+
+
+def _between(means: np.ndarray, span: float) -> list:
+    """
+    Return the trials of each load that lies between others, to be held out in turn.
+
+    The lowest and the highest load reach inputs of H2 that no other shows: to hold them out would
+    ask for an extrapolation, which no H1 does well.
+    """
+    level = np.round(means / (1e-3 * span)) if span > 0.0 else np.zeros(len(means))
+    return [np.flatnonzero(level == value) for value in np.unique(level)[1:-1]]
 
 
 def _search(score: Callable, exponents: Sequence[float]) -> np.ndarray:
