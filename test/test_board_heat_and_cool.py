@@ -51,6 +51,11 @@ def test_gives_up_on_a_board_that_does_not_heat():
         run(HeatAndCool(6.0, 30.0, 60.0), apply=lambda voltage: 3.0)
 
 
+def test_a_few_percent_of_the_voltage_do_not_matter():
+    _, time = run(HeatAndCool(6.0, 30.0, 60.0), apply=lambda voltage: 0.96 * voltage)
+    assert time == pytest.approx(90.0, abs=0.5)
+
+
 def test_gives_up_on_a_board_that_does_not_stop():
     with pytest.raises(BoardError, match='0 V asked for, 6 V applied while cooling'):
         run(HeatAndCool(6.0, 30.0, 60.0), apply=lambda voltage: 6.0)

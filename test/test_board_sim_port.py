@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame
 from hysteresis_ros.bridge.simulated_board import SimulatedBoard, TICK
+from hysteresis_ros.bridge.simulated_cable import Cable
 from hysteresis_ros.bridge.simulation_url import parse_url, Simulation
 from hysteresis_ros.bridge.urlhandlers import protocol_sim
-from hysteresis_ros.bridge.urlhandlers.protocol_sim import Cable
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.plant import Plant
 import pytest

@@ -13,102 +13,19 @@ and 0 is sent. The board's: no setpoint within ``timeouts.watchdog``, and it sto
 
 import threading
 import time
-from typing import NamedTuple
 
 from hysteresis_ros.bridge.board_clock import BoardClock
 from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
+from hysteresis_ros.bridge.board_state import Sample, Status
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.messages import (
-    DISABLE, ENABLE, FAULTS, Identity, NO, SET, Telemetry, TELEMETRY)
+    DISABLE, ENABLE, FAULTS, NO, SET, Telemetry, TELEMETRY)
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError
 
 SUPPLY_SMOOTHING = 0.1      # share of a new measurement of the supply
 SUPPLY_STEP = 0.03          # relative change that is taken at once
 STOP_PATIENCE = 0.5         # s to wait on the way out until the board says that it is off
-
-
-class Sample(NamedTuple):
-    """
-    One frame of telemetry in SI units.
-
-    Attributes
-    ----------
-    time : float
-        Board time in s since the first contact; it only grows, also over restarts.
-    angle, velocity : float
-        In rad and rad/s.
-    fresh : bool
-        Whether the encoder's sample was believed; if not, `angle` is the one before.
-    voltage : float
-        Voltage in V that the board applies, as its duty and supply say.
-    supply : float
-        Smoothed supply voltage in V.
-    ambient : float or None
-        Ambient temperature in degC, in the frames that carry it.
-    enabled : bool
-        Whether the board takes setpoints.
-    faults : tuple of str
-        The board's faults, see `messages.FAULTS`.
-    encoder_fault : str
-        What is wrong with the angle, or ''.
-
-    """
-
-    time: float
-    angle: float
-    velocity: float
-    fresh: bool
-    voltage: float
-    supply: float
-    ambient: 'float | None'
-    enabled: bool
-    faults: tuple
-    encoder_fault: str
-
-
-class Status(NamedTuple):
-    """
-    How things are.
-
-    Attributes
-    ----------
-    online : bool
-        Whether telemetry comes.
-    problem : str
-        Why not, or '' while nobody has tried yet.
-    faults : str
-        The board's faults in words, or ''.
-    limit : str
-        Why the output is less than asked for, or ''.
-    expired : bool
-        Whether the setpoint is too old, so that 0 is sent.
-    refusal : str
-        The board's latest refusal, or ''.
-    sample : Sample or None
-        The latest one.
-    identity : Identity or None
-        The board's latest greeting.
-    frames, bad_lines, lost_frames, connections : int
-        Counters since the start.
-    last_bad_line : str
-        The latest bad line and what was wrong with it, or ''.
-
-    """
-
-    online: bool
-    problem: str
-    faults: str
-    limit: str
-    expired: bool
-    refusal: str
-    sample: 'Sample | None'
-    identity: 'Identity | None'
-    frames: int
-    bad_lines: int
-    lost_frames: int
-    connections: int
-    last_bad_line: str
 
 
 class Board:

@@ -28,66 +28,18 @@ from std_srvs.srv import SetBool, Trigger
 
 from hysteresis_ros.bridge.board import Board
 from hysteresis_ros.bridge.board_link import Timeouts
-from hysteresis_ros.bridge.encoder import Encoder
-from hysteresis_ros.bridge.heat_and_cool import HeatAndCool
-from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.bridge.stamps import RealStamps, SimulatedStamps
-from hysteresis_ros.errors import BoardError, ParameterError, RangeError
+from hysteresis_ros.errors import BoardError, RangeError
+from hysteresis_ros.nodes.bridge_parameters import (
+    check, make_cycle, make_encoder, make_pwm, PARAMETERS)
 from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, OK, WARN
-from hysteresis_ros.nodes.parameters import NAMES, Parameters, Spec, VOLTAGE_LIMITS
+from hysteresis_ros.nodes.parameters import Parameters
 from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
 from hysteresis_ros.nodes.running import run
 
 LOOK_PERIOD = 0.05          # s of the wall between two looks at the board's status
 ENABLE_PATIENCE = 3.0       # s of the wall that ~/enable waits for the board to follow
 BAD_LINES_SHOWN_FOR = 5.0   # s of the wall after the latest bad line
-
-BOARD = (
-    Spec('port', 'sim://bicep', 'Device or pyserial URL of the board; sim://bicep?speed=60&seed=1 '
-         'and the like for the simulated one', read_only=True),
-    Spec('baud', 115200, 'Speed of the serial line', 'bit/s', 1200, 4000000, read_only=True),
-    Spec('telemetry_rate', 10.0, 'How often the board reports', 'Hz', 0.1, 200.0, read_only=True),
-    Spec('start_enabled', True, 'Whether setpoints are followed from the start, without ~/enable',
-         read_only=True),
-    Spec('setpoint_timeout', 2.0, 'Time without a setpoint after which the output is zero; by the '
-         'slower of wall clock and board clock', 's', 0.05, 600.0, read_only=True),
-    Spec('telemetry_timeout', 1.0, 'Time without telemetry after which the board counts as lost; '
-         'by the slower clock', 's', 0.05, 600.0, read_only=True),
-    Spec('board_watchdog', 1.0, 'Time without a word from this node after which the board '
-         'switches off on its own; by the slower clock', 's', 0.3, 60.0, read_only=True),
-)
-
-OUTPUT = (
-    Spec('pwm_law', 'rms', "What the voltage stands for: 'rms', duty = (V / supply)^2, because "
-         "heating follows the mean square; 'mean', duty = V / supply", read_only=True),
-    Spec('maximum_duty', 1.0, 'Largest duty', '', 0.01, 1.0),
-    Spec('supply_voltage', 12.0, 'Nominal voltage of the supply', 'V', 1.0, 60.0, read_only=True),
-    Spec('supply_tolerance', 0.25, 'Share by which the measured supply may differ; beyond, the '
-         'output is off', '', 0.01, 0.9, read_only=True),
-)
-
-ENCODER = (
-    Spec('counts_per_revolution', 8192, 'Quadrature counts in a turn: four times the pulses',
-         '', 4, 1000000, read_only=True),
-    Spec('encoder_direction', 1, '1 if counts grow with the angle, -1 if they fall', '', -1, 1,
-         read_only=True),
-    Spec('encoder_zero', 0.0, 'Angle at count 0', 'rad', -6.3, 6.3, read_only=True),
-    Spec('encoder_index', 'ignore', "What the index pulse is for: 'ignore'; 'check' that no "
-         "counts are lost; 'home': it comes at encoder_index_angle", read_only=True),
-    Spec('encoder_index_angle', 0.0, 'Angle at the index pulse', 'rad', -6.3, 6.3,
-         read_only=True),
-    Spec('encoder_maximum_speed', 30.0, 'Speed that the arm cannot exceed; faster counts are not '
-         'believed', 'rad/s', 0.1, 1000.0, read_only=True),
-    Spec('velocity_window', 0.1, 'Time over which the velocity is taken', 's', 0.0, 10.0,
-         read_only=True),
-)
-
-INITIALISATION = (
-    Spec('initialise_voltage', 6.0, 'Heating voltage of ~/initialise, at most maximum_voltage',
-         'V', 0.1, 48.0),
-    Spec('initialise_heat_time', 30.0, 'Heating time of ~/initialise', 's', 1.0, 3600.0),
-    Spec('initialise_cool_time', 60.0, 'Shortest cooling time of ~/initialise', 's', 1.0, 3600.0),
-)
 
 
 class BridgeNode(Node):
@@ -100,14 +52,14 @@ class BridgeNode(Node):
         For `rclpy.node.Node`, such as ``namespace`` or ``parameter_overrides``.
     """
 
-    PARAMETERS = BOARD + OUTPUT + ENCODER + INITIALISATION + VOLTAGE_LIMITS + NAMES
+    PARAMETERS = PARAMETERS
 
     def __init__(self, **options):
         super().__init__('hardware_bridge', **options)
         self._settings = parameters = Parameters(
-            self, self.PARAMETERS, check=_check, changed=self._configure)
+            self, self.PARAMETERS, check=check, changed=self._configure)
         self._board = Board(
-            parameters['port'], parameters['baud'], _pwm(parameters), _encoder(parameters),
+            parameters['port'], parameters['baud'], make_pwm(parameters), make_encoder(parameters),
             Timeouts(setpoint=parameters['setpoint_timeout'],
                      telemetry=parameters['telemetry_timeout'],
                      watchdog=parameters['board_watchdog']),
@@ -148,7 +100,7 @@ class BridgeNode(Node):
         super().destroy_node()
 
     def _configure(self, parameters):
-        self._board.pwm = _pwm(parameters)
+        self._board.pwm = make_pwm(parameters)
 
     # Setpoints and services
 
@@ -198,7 +150,7 @@ class BridgeNode(Node):
                 return response
             self._outcome = None
             self._progress = 'begun'
-            self._cycle = _cycle(self._settings)
+            self._cycle = make_cycle(self._settings)
         await self._until(lambda status: self._outcome is not None)
         response.success, response.message = self._outcome
         self._diagnostics.clear('setpoint')
@@ -352,32 +304,6 @@ class BridgeNode(Node):
                 'applied voltage [V]': sample.voltage, 'supply [V]': sample.supply,
                 'enabled': sample.enabled})
         return values
-
-
-def _pwm(values):
-    return Pwm(values['pwm_law'], values['minimum_voltage'], values['maximum_voltage'],
-               values['maximum_duty'])
-
-
-def _encoder(values):
-    return Encoder(
-        values['counts_per_revolution'], values['encoder_direction'], values['encoder_zero'],
-        maximum_speed=values['encoder_maximum_speed'], velocity_window=values['velocity_window'],
-        index=values['encoder_index'], index_angle=values['encoder_index_angle'])
-
-
-def _cycle(values):
-    return HeatAndCool(min(values['initialise_voltage'], values['maximum_voltage']),
-                       values['initialise_heat_time'], values['initialise_cool_time'])
-
-
-def _check(values):
-    _pwm(values)
-    _encoder(values)
-    if values['telemetry_timeout'] * values['telemetry_rate'] < 2.0:
-        raise ParameterError(
-            f'telemetry_timeout {values["telemetry_timeout"]:g} s has to be at least two periods '
-            f'of the telemetry_rate {values["telemetry_rate"]:g} Hz')
 
 
 def _message(seconds):
