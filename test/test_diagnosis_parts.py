@@ -1,0 +1,316 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The statistics and the bookkeeping that a diagnosis is made of, each against its definition."""
+
+from hypothesis import given, strategies as st
+from model_support import bicep_model, effect_of, STRENGTHS, wandering_voltage
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis import structure
+from hysteresis_ros.diagnosis.fit import Fitter
+from hysteresis_ros.diagnosis.leftover import examine, flexible, lasting_step
+from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.diagnosis.problem import problem_for, sensor_resolution
+from hysteresis_ros.diagnosis.significance import (
+    block_sums, cosines, family_p_values, flipped, gain_interval, held_out_errors,
+    paired_p_values, residualise)
+from hysteresis_ros.effects import catalogue
+from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.measurements import Measurement
+
+ROWS = 60
+
+
+def runs(model, trials=3, rows=ROWS, seed=0, step=30.0, sizes=None):
+    """Return an arm run of some settled trials that the model itself has made."""
+    sizes = sizes or [rows] * trials
+    voltage = np.concatenate([
+        wandering_voltage(400, seed + trial)[::400 // size][:size]
+        for trial, size in enumerate(sizes)])
+    trial = np.repeat(np.arange(float(len(sizes))), sizes)
+    time = step * np.concatenate([1.0 + np.arange(size) for size in sizes])
+    columns = {'time': time, 'trial': trial, 'voltage': voltage, 'angle': np.ones(len(voltage))}
+    angle = model.predict(Measurement.from_columns(columns))
+    return Measurement.from_columns({**columns, 'angle': angle})
+
+
+@pytest.fixture(scope='module')
+def problem():
+    """Return rows of a model without any error."""
+    model = bicep_model()
+    return problem_for(model, [runs(model)])
+
+
+@pytest.mark.parametrize('name', sorted(STRENGTHS))
+def test_a_vector_gives_back_the_values_it_was_made_of(name):
+    """Logarithms and units of the plausible range cancel."""
+    effect = effect_of(bicep_model(), name)
+    for kind in effect.kinds:
+        parameters = ParameterVector([effect], kind)
+        again, = parameters.with_vector(parameters.vector())
+        fitted = [parameter.name for _, parameter in parameters.entries
+                  if kind == 'arm' or parameter.name in STRENGTHS[name]]
+        for each in fitted:
+            assert again.values[each] == pytest.approx(effect.values[each], rel=1e-9)
+        assert np.all(parameters.lower < parameters.upper)
+
+
+@given(st.sampled_from(sorted(STRENGTHS)), st.lists(
+    st.floats(-1e3, 1e3), min_size=4, max_size=4))
+def test_no_vector_leads_out_of_the_bounds(name, numbers):
+    """Whatever the optimiser tries, the effect gets values that it accepts."""
+    parameters = ParameterVector([effect_of(bicep_model(), name)], 'arm')
+    effect, = parameters.with_vector(np.array(numbers[:len(parameters)]))
+    for _, parameter in parameters.entries:
+        low, high = parameter.bounds
+        slack = 1e-9 * (high - low)
+        assert low - slack <= effect.values[parameter.name] <= high + slack
+
+
+def test_vectors_of_two_effects_stay_apart():
+    """Each component moves its own effect and no other."""
+    model = bicep_model()
+    effects = [effect_of(model, 'payload_error'), effect_of(model, 'encoder_offset')]
+    parameters = ParameterVector(effects, 'arm')
+    vector = parameters.vector()
+    vector[1] *= 0.5
+    first, second = parameters.with_vector(vector)
+    assert first.values == pytest.approx(effects[0].values)
+    assert second.values['offset'] == pytest.approx(0.5 * effects[1].values['offset'])
+
+
+def test_an_end_of_the_range_is_noticed_for_the_effect_that_meets_it():
+    """An estimate at a bound stands in for something else."""
+    model = bicep_model()
+    parameters = ParameterVector(
+        [effect_of(model, 'payload_error'), effect_of(model, 'encoder_offset')], 'arm')
+    vector = parameters.vector()
+    assert parameters.at_bound(vector) == [False, False]
+    vector[1] = parameters.upper[1]
+    assert parameters.at_bound(vector) == [False, True]
+
+
+def test_intervals_are_given_in_the_unit_of_the_parameter():
+    """A logarithmic component has an interval by a factor."""
+    parameters = ParameterVector([effect_of(bicep_model(), 'thermal_lag')], 'arm')
+    vector = parameters.vector()
+    effect, = parameters.with_intervals(vector, np.full(len(vector), np.log(1.5)))
+    low, high = effect.intervals['time_constant']
+    assert (low, high) == pytest.approx((3.0 / 1.5, 3.0 * 1.5))
+
+
+@pytest.mark.parametrize('name', sorted(catalogue()))
+def test_fits_start_from_different_plausible_values(name):
+    """At most as many as asked for, ends included, none twice."""
+    effect = catalogue()[name](bicep_model().surroundings)
+    for kind in effect.kinds:
+        starts = starts_of(effect, kind, most=5)
+        assert 1 <= len(starts) <= 5
+        values = [tuple(sorted(start.values.items())) for start in starts]
+        assert len(set(values)) == len(values)
+        assert not any(start.implausible() for start in starts)
+
+
+def test_held_out_errors_are_those_of_numpy_fold_by_fold():
+    """Each fold is predicted by least squares on the others."""
+    rng = np.random.default_rng(1)
+    columns, fold = rng.standard_normal((40, 3)), np.arange(40) // 10
+    targets = columns @ rng.standard_normal((3, 5)) + rng.standard_normal((40, 5))
+    expected = np.zeros(5)
+    for number in range(4):
+        test = fold == number
+        weights = np.linalg.lstsq(columns[~test], targets[~test], rcond=None)[0]
+        expected += np.sum((targets[test] - columns[test] @ weights) ** 2, axis=0)
+    assert held_out_errors(columns, targets.T, fold) == pytest.approx(expected / 40, rel=1e-6)
+    nothing = held_out_errors(np.zeros((40, 0)), targets.T, fold)
+    assert nothing == pytest.approx(np.mean(targets ** 2, axis=0))
+
+
+def test_family_p_values_count_the_best_of_all_candidates():
+    """A gain has to beat the best of the family in a draw, not its own chance."""
+    chance = np.array([[1.0, 2.0, 3.0, 0.0], [4.0, 0.0, 0.0, 0.5]])
+    values = family_p_values(np.array([2.5, 5.0, 0.1]), chance)
+    assert values == pytest.approx([3 / 5, 1 / 5, 1.0])
+
+
+def test_flipped_residuals_keep_size_and_blocks():
+    """Only the signs change, and those of a block together."""
+    residual, block = np.arange(1.0, 13.0), np.arange(12) // 3
+    draws = flipped(residual, block, np.random.default_rng(0), 50)
+    assert draws.shape == (50, 12)
+    signs = draws / residual
+    assert set(np.unique(signs)) == {-1.0, 1.0}
+    assert np.all(signs.reshape(50, 4, 3) == signs.reshape(50, 4, 3)[:, :, :1])
+
+
+def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():
+    """The same sum in every block counts, in a single one it does not."""
+    rng = np.random.default_rng(2)
+    steady = 1.0 + 0.3 * rng.standard_normal(24)
+    lucky = np.r_[24.0, np.zeros(23)]
+    values = paired_p_values(np.stack([steady, lucky, -steady]), rng)
+    assert values[0] < 0.02 and values[1] > 0.2 and values[2] > 0.9
+
+
+def test_the_interval_of_a_gain_holds_its_value():
+    """Half of every residual gone is a gain of exactly one half."""
+    rng = np.random.default_rng(3)
+    before, block = rng.standard_normal(240), np.arange(240) // 10
+    assert gain_interval(before, 0.5 * before, block, rng) == pytest.approx((0.5, 0.5))
+    low, high = gain_interval(before, rng.standard_normal(240), block, rng)
+    assert low < 0.0 < high
+    assert block_sums(np.ones(240), block).tolist() == [10.0] * 24
+
+
+def test_cosines_and_what_is_left_beside_columns():
+    """Opposite directions are the same signature; projections are orthogonal."""
+    vectors = np.array([[1.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    expected = [[1, 1, 0.5 ** 0.5, 0], [1, 1, 0.5 ** 0.5, 0], [0.5 ** 0.5, 0.5 ** 0.5, 1, 0],
+                [0, 0, 0, 0]]
+    assert cosines(vectors) == pytest.approx(np.array(expected))
+    columns = np.array([[1.0, 2.0], [1.0, 2.0], [0.0, 0.0]])
+    left = residualise(columns, vectors)
+    assert np.abs(left @ columns).max() < 1e-12
+    assert left[2] == pytest.approx([0.0, 0.0, 0.0])
+    assert left[0] == pytest.approx([0.5, -0.5, 0.0])
+    assert residualise(np.zeros((3, 0)), vectors) is vectors
+
+
+@given(st.integers(30, 170), st.sampled_from([-1.0, 1.0]))
+def test_a_planted_step_is_found_at_its_row(row, sign):
+    """Something that slips once leaves a step."""
+    noise = 0.1 * np.random.default_rng(row).standard_normal(200)
+    found, share = lasting_step(noise + sign * (np.arange(200) >= row))
+    assert abs(found - row) <= 1
+    assert share > 0.8
+
+
+def test_noise_has_no_step_and_few_rows_none_at_all():
+    """The best split of white noise explains next to nothing."""
+    assert lasting_step(np.random.default_rng(5).standard_normal(400))[1] < 0.05
+    assert lasting_step(np.array([0.0, 0.0, 1.0, 1.0])) == (0, 0.0)
+
+
+def test_a_flexible_regression_finds_smooth_dependence_and_leaves_noise():
+    """The share on held-out rows is that of the planted part."""
+    rng = np.random.default_rng(6)
+    signals = {'drive': rng.uniform(0.0, 6.0, 400), 'load': rng.standard_normal(400)}
+    fold, noise = np.arange(400) // 50 % 4, rng.standard_normal(400)
+    planted = 3.0 * np.sin(signals['drive'])
+    truth = np.var(planted) / np.var(planted + noise)
+    assert flexible(signals, planted + noise, fold) == pytest.approx(truth, abs=0.12)
+    assert flexible(signals, noise, fold) < 0.03
+    assert flexible({}, noise, fold) == 0.0
+
+
+def test_what_is_left_names_the_signal_in_which_it_shows(problem):
+    """A residual that follows the drive says drive, and white noise says nothing."""
+    drive = problem.signals['drive']
+    left = examine(problem, np.cos(0.5 * drive))
+    assert left.explained > 0.8 and left.signal == 'drive'
+    noise = examine(problem, np.random.default_rng(7).standard_normal(len(drive)))
+    assert noise.explained < 0.1 and noise.signal == ''
+
+
+def test_an_event_has_the_time_since_the_recording_began():
+    """Trials follow each other, and the clock runs on."""
+    model = bicep_model()
+    problem = problem_for(model, [runs(model)])
+    row = 2 * ROWS - 20
+    left = examine(problem, (np.arange(3 * ROWS) >= row).astype(float))
+    assert left.event_share > 0.99
+    assert left.event == problem.clock[row]
+    assert np.all(np.diff(problem.clock) > 0.0)
+
+
+def test_decoys_have_the_size_that_the_bench_found_and_the_noise(problem):
+    """In the angle they are the error of the length times the arm's sensitivity."""
+    model = problem.model
+    assert structure.length_error(model) == 0.0004
+    rng = np.random.default_rng(8)
+    predicted = problem.simulate([])
+    draws = structure.decoys(problem, [], predicted, rng, 800)
+    assert draws.shape == (800, len(predicted))
+    gain = structure.sensitivity(problem, [])
+    expected = np.sqrt(np.mean((0.0004 * gain) ** 2) + problem.noise ** 2)
+    assert np.sqrt(np.mean(draws ** 2)) == pytest.approx(expected, rel=0.08)
+    assert abs(np.mean(draws)) < 0.1 * expected
+
+
+def test_the_sensitivity_is_the_slope_of_the_arm(problem):
+    """A longer muscle raises the angle by the inverse of dL/dtheta, less what the load gives."""
+    gain = structure.sensitivity(problem, [])
+    theta = problem.measured
+    step = 1e-5
+    length = problem.model.geometry.length
+    slope = (length(theta + step) - length(theta - step)) / (2.0 * step)
+    assert np.all(gain * slope > 0.0)
+    assert np.median(gain * slope) == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_model_without_verification_falls_back_on_what_it_has():
+    """The error of the fitted trials counts where no others are, and none is zero."""
+    model = bicep_model(metrics={'length': {'identification': {'rmse': 0.001}}})
+    assert structure.length_error(model) == 0.001
+    assert structure.length_error(bicep_model(metrics={})) == 0.0
+
+
+def test_whole_trials_are_held_out_together():
+    """Memory leaks across random splits, so a trial is never divided."""
+    model = bicep_model()
+    problem = problem_for(model, [runs(model, 3), runs(model, 3, seed=9)])
+    assert np.unique(problem.trial).tolist() == list(range(6))
+    for trial in range(6):
+        assert len(np.unique(problem.fold[problem.trial == trial])) == 1
+    for block in np.unique(problem.block):
+        assert len(np.unique(problem.trial[problem.block == block])) == 1
+    assert problem.folds.tolist() == [0, 1, 2, 3]
+
+
+def test_one_trial_is_held_out_in_blocks_of_time():
+    """Every fold is some stretches of the recording, and all rows are in one."""
+    model = bicep_model()
+    problem = problem_for(model, [runs(model, 1, rows=80)])
+    assert problem.folds.tolist() == [0, 1, 2, 3]
+    assert np.count_nonzero(np.diff(problem.fold)) == 7
+
+
+def test_the_fit_finds_a_planted_payload(problem):
+    """With its interval, and on the rows that were held out."""
+    truth = effect_of(problem.model, 'payload_error', dm=15.0)
+    data = runs(problem.model.with_effects([truth]))
+    fitter = Fitter(problem_for(problem.model, [data]))
+    effect = catalogue()['payload_error'](problem.model.surroundings)
+    fit = fitter.cross_validate([], fitter.search([], [], effect))
+    found, = fitter.with_intervals(fit)
+    assert found.values['dm'] == pytest.approx(15.0, abs=0.05)
+    low, high = found.intervals['dm']
+    assert low <= found.values['dm'] <= high
+    assert fitter.error(fit.held_out) < 1e-3
+    assert fitter.error(fitter.problem.simulate([])) > 0.02
+    assert fit.implausible() == []
+
+
+def test_the_noise_of_a_sensor_comes_from_its_steps():
+    """Counts of an encoder are uniform in their step."""
+    angle = 0.001 * np.round(np.random.default_rng(0).uniform(1.0, 2.0, 500) / 0.001)
+    data = Measurement.from_columns({
+        'time': 30.0 * np.arange(500.0), 'trial': np.zeros(500), 'voltage': angle,
+        'angle': angle})
+    assert sensor_resolution(data) == pytest.approx(0.001 / 12 ** 0.5, rel=1e-6)
+
+
+def test_recordings_that_do_not_go_together_are_refused():
+    """One line says which kinds there are, or what to give instead."""
+    model = bicep_model()
+    bench = Measurement.from_columns({
+        'trial': np.zeros(5), 'step': np.arange(5.0), 'voltage': np.arange(5.0),
+        'force': np.ones(5), 'length': np.linspace(0.0, -0.01, 5)})
+    force = Measurement.from_columns({
+        'trial': np.zeros(5), 'step': np.arange(5.0), 'voltage': np.arange(5.0),
+        'force': np.ones(5)})
+    for given_, words in (([], 'no measurement'), ([force], 'length table'),
+                          ([bench, runs(model, 1)], 'several kinds')):
+        with pytest.raises(MeasurementError, match=words):
+            problem_for(model, given_)

@@ -1,0 +1,181 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Adding effects to a model: what is refused, what is fitted, what is written and read again."""
+
+import json
+import math
+
+from model_support import arm_run, bicep_model, effect_of, wandering_voltage
+import numpy as np
+import pytest
+
+from hysteresis_ros.cli.main import main
+from hysteresis_ros.diagnosis.extend import extend, rmse
+from hysteresis_ros.errors import MeasurementError, ParameterError
+from hysteresis_ros.measurements import Measurement, write_csv
+from hysteresis_ros.model import MuscleModel
+
+
+def run_of(model, seed, noise=2e-3):
+    """Return a settled run of an arm that is as the model says, with a little noise."""
+    run = arm_run(wandering_voltage(400, seed)[::5])
+    angle = model.predict(run) + noise * np.random.default_rng(seed).standard_normal(run.rows)
+    return Measurement.from_columns({**run.columns, 'angle': angle}, source=f'run{seed}.csv')
+
+
+@pytest.fixture(scope='module')
+def base():
+    """Return the model without effects."""
+    return bicep_model()
+
+
+@pytest.fixture(scope='module')
+def recordings(base):
+    """Return two recordings of an arm with 15 g too much and an encoder off by 2 degrees."""
+    arm = base.with_effects([effect_of(base, 'payload_error', dm=15.0),
+                             effect_of(base, 'encoder_offset', offset=2.0)])
+    return run_of(arm, 1), run_of(arm, 2)
+
+
+@pytest.fixture(scope='module')
+def extension(base, recordings):
+    """Return the model extended with both effects."""
+    train, test = recordings
+    return extend(base, ['payload_error', 'encoder_offset'], [train], [test])
+
+
+def test_both_effects_get_the_values_of_the_arm(extension):
+    """The intervals hold the truth and are narrow."""
+    values = [effect.values for effect in extension.added]
+    assert values[0]['dm'] == pytest.approx(15.0, abs=2.0)
+    assert values[1]['offset'] == pytest.approx(2.0, abs=0.5)
+    for effect, name in zip(extension.added, ('dm', 'offset')):
+        low, high = effect.intervals[name]
+        assert low < effect.values[name] < high
+        assert high - low < 0.5 * abs(effect.values[name])
+    assert extension.implausible == []
+
+
+def test_the_error_on_the_unseen_recording_falls_to_the_noise(extension, base, recordings):
+    """Step by step: the base, one effect more, both."""
+    assert extension.test['rmse_before'] == rmse(base, recordings[1:])
+    assert extension.test['rmse_before'] > 0.03
+    assert extension.test['rmse_after'] < 1.15 * 2e-3
+    names, errors = zip(*extension.steps)
+    assert names == ('base', '+ payload_error', '+ encoder_offset')
+    assert errors[0] > errors[1] > errors[2] == extension.test['rmse_after']
+    assert extension.train['rmse_after'] < 0.1 * extension.train['rmse_before']
+
+
+def test_the_error_of_a_model_is_that_over_all_rows_of_all_recordings(base, recordings):
+    """A root of the mean of squares, not a mean of roots."""
+    errors = np.concatenate([base.predict(m) - m.column('angle') for m in recordings])
+    assert rmse(base, recordings) == pytest.approx(math.sqrt(np.mean(errors ** 2)))
+
+
+def test_the_json_is_as_programs_expect_it(extension):
+    """Plain finite numbers under the names that were promised."""
+    content = json.loads(json.dumps(extension.to_json(), allow_nan=False))
+    assert content['added'] == ['payload_error', 'encoder_offset']
+    assert set(content['parameters']) == set(content['added'])
+    assert set(content['parameters']['payload_error']['dm']) >= {'value', 'low', 'high', 'unit'}
+    for part in ('train', 'test'):
+        assert set(content[part]) == {'rmse_before', 'rmse_after'}
+
+
+def test_the_file_of_an_extended_model_predicts_the_same(extension, recordings, tmp_path):
+    """With its effects, their intervals, and what they were fitted to."""
+    extension.model.save(tmp_path / 'extended.yaml')
+    again = MuscleModel.load(tmp_path / 'extended.yaml')
+    assert [effect.id for effect in again.effects] == ['payload_error', 'encoder_offset']
+    assert [e.to_dict() for e in again.effects] == [e.to_dict() for e in extension.added]
+    assert np.array_equal(again.predict(recordings[1]), extension.model.predict(recordings[1]))
+    entry, = again.provenance['extended']
+    assert entry['effects'] == ['payload_error', 'encoder_offset']
+    assert entry['data'][0]['source'] == 'run1.csv'
+    assert len(entry['data'][0]['sha256']) == 64
+
+
+def test_the_weights_of_the_bench_stay_as_they_are(extension, base):
+    """On the arm nothing but the effects is fitted."""
+    assert extension.model.length_stage.to_dict() == base.length_stage.to_dict()
+    assert extension.model.force_stage.to_dict() == base.force_stage.to_dict()
+    assert base.effects == [] and 'extended' not in base.provenance
+
+
+def test_a_second_extension_builds_on_the_first(base, recordings):
+    """The first stays as it was fitted, and the second explains a part of what is left."""
+    train, test = recordings
+    first = extend(base, ['payload_error'], [train], [test])
+    second = extend(first.model, ['encoder_offset'], [train], [test])
+    assert [effect.id for effect in second.model.effects] == ['payload_error', 'encoder_offset']
+    assert second.test['rmse_before'] == first.test['rmse_after']
+    assert second.train['rmse_after'] < second.train['rmse_before']
+    assert second.model.effects[0].values == first.model.effects[0].values
+    assert len(second.model.provenance['extended']) == 2
+
+
+@pytest.mark.parametrize('names, words', [
+    (['gremlins'], "there is no effect 'gremlins'"),
+    (['payload_error', 'payload_error'], 'payload_error is named twice'),
+    (['backlash'], 'already has the effect backlash'),
+    ([], 'no effect is named')])
+def test_names_that_make_no_sense_are_refused(base, recordings, names, words):
+    """Before anything is fitted."""
+    model = base.with_effects([effect_of(base, 'backlash')])
+    with pytest.raises(ParameterError, match=words):
+        extend(model, names, recordings[:1])
+
+
+def test_an_effect_of_the_arm_is_not_fitted_to_a_bench(base):
+    """No bench table knows the payload."""
+    steps = np.arange(12.0)
+    bench = Measurement.from_columns({
+        'trial': np.zeros(12), 'step': steps, 'voltage': 3.0 + 3.0 * np.sin(steps),
+        'force': np.full(12, 2.0), 'length': -0.01 * np.sin(steps)})
+    with pytest.raises(ParameterError, match='payload_error cannot be fitted to a bench'):
+        extend(base, ['payload_error'], [bench])
+
+
+def test_recordings_of_two_kinds_are_refused(base, recordings):
+    """One fit cannot be judged by two quantities."""
+    bench = Measurement.from_columns({
+        'trial': np.zeros(3), 'step': np.arange(3.0), 'voltage': np.arange(3.0),
+        'force': np.ones(3), 'length': np.zeros(3)})
+    with pytest.raises(MeasurementError, match='several kinds'):
+        extend(base, ['payload_error'], [recordings[0], bench])
+
+
+def test_the_command_says_the_gain_and_writes_model_json_and_page(
+        base, recordings, tmp_path, capsys):
+    """From files to files."""
+    base.save(tmp_path / 'model.yaml')
+    for name, recording in zip(('train.csv', 'test.csv'), recordings):
+        write_csv(recording, tmp_path / name)
+    command = ['extend', '--model', str(tmp_path / 'model.yaml'), '--add',
+               'payload_error, encoder_offset', '--data', str(tmp_path / 'train.csv'),
+               '--test', str(tmp_path / 'test.csv'), '-o', str(tmp_path / 'new.yaml')]
+    written = ['--json', str(tmp_path / 'r.json'), '--report', str(tmp_path / 'r.html')]
+    assert main(command + written) == 0
+    said = capsys.readouterr().out
+    assert '+ payload_error: dm' in said and 'not fitted' in said
+    content = json.loads((tmp_path / 'r.json').read_text(encoding='utf-8'))
+    assert content['test']['rmse_after'] < 0.1 * content['test']['rmse_before']
+    assert len(MuscleModel.load(tmp_path / 'new.yaml').effects) == 2
+    assert 'unseen recording' in (tmp_path / 'r.html').read_text(encoding='utf-8')
+
+    command[4] = 'gremlins'
+    assert main(command) == 1
+    error = capsys.readouterr().err
+    assert error.count('\n') == 1 and 'gremlins' in error
+
+
+def test_the_recording_is_not_overwritten(base, recordings, tmp_path, capsys):
+    """An output named like an input is a slip of the pen."""
+    base.save(tmp_path / 'model.yaml')
+    write_csv(recordings[0], tmp_path / 'train.csv')
+    before = (tmp_path / 'train.csv').read_bytes()
+    assert main(['extend', '--model', str(tmp_path / 'model.yaml'), '--add', 'payload_error',
+                 '--data', str(tmp_path / 'train.csv'), '-o', str(tmp_path / 'train.csv')]) == 1
+    assert capsys.readouterr().err.count('\n') == 1
+    assert (tmp_path / 'train.csv').read_bytes() == before
