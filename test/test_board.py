@@ -481,10 +481,17 @@ def test_encoder_belongs_to_the_board(boards):
     assert board.status.sample.angle == pytest.approx(4.0 - Plant(0).arm.angle, abs=2e-3)
 
 
-def test_supply_is_smoothed_but_a_step_is_taken_at_once(boards):
-    board = online(boards('sim://bicep'))
-    board._supply = 12.0
-    board._smooth(12.1)
-    assert board._supply == pytest.approx(12.0 + 0.1 * board_module.SUPPLY_SMOOTHING)
+def test_supply_is_averaged_but_a_step_is_taken_at_once():
+    board = Board('sim://bicep')
+    for supply in (12.0, 12.1, 11.9, 12.2):
+        board._smooth(supply)
+    assert board._supply == pytest.approx(12.05)
+    for _ in range(1000):
+        board._smooth(12.3)
+    assert board._supply == pytest.approx(12.3)
+    board._smooth(12.0)
+    assert board._supply == pytest.approx(12.3 - 0.3 / board_module.SUPPLY_SAMPLES)
     board._smooth(11.0)
     assert board._supply == 11.0
+    board._smooth(11.2)
+    assert board._supply == pytest.approx(11.1)

@@ -23,7 +23,7 @@ from hysteresis_ros.bridge.messages import (
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError
 
-SUPPLY_SMOOTHING = 0.1      # share of a new measurement of the supply
+SUPPLY_SAMPLES = 50         # measurements of the supply over which is averaged, about
 SUPPLY_STEP = 0.03          # relative change that is taken at once
 STOP_PATIENCE = 0.5         # s to wait on the way out until the board says that it is off
 
@@ -96,7 +96,8 @@ class Board:
         self._online = False
         self._problem = ''
         self._write_problem = None
-        self._supply = None
+        self._supply = None         # averaged over so many samples:
+        self._supply_samples = 0
         self._identity = None
         self._sample = None
         self._received = 0.0        # wall time of the latest sample
@@ -296,11 +297,13 @@ class Board:
         self._on_sample(sample)
 
     def _smooth(self, supply):
+        """Average the supply, so that its noise does not move the muscle to and fro."""
         before = self._supply
         if before is None or abs(supply - before) > SUPPLY_STEP * self._nominal_supply:
-            self._supply = supply
+            self._supply, self._supply_samples = supply, 1
         else:
-            self._supply = before + SUPPLY_SMOOTHING * (supply - before)
+            self._supply_samples = min(self._supply_samples + 1, SUPPLY_SAMPLES)
+            self._supply += (supply - before) / self._supply_samples
 
     def _lose(self, problem):
         with self._wake:
