@@ -7,6 +7,7 @@ import math
 import time
 
 from node_support import GEOMETRY_OF_TESTS, Graph, small_model
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import numpy as np
 import pytest
 from rcl_interfaces.srv import SetParameters
@@ -152,6 +153,30 @@ def test_reset_forgets_the_history_and_the_setpoint(graph):
     fresh = offline([1.7])[0]
     assert muscle.voltages[-1] == pytest.approx(fresh, abs=1e-12)
     assert abs(fresh - offline(angles)[-1]) > 1e-3
+
+
+def test_the_heat_and_cool_cycle_of_the_bridge_wipes_the_memory(graph):
+    """Not that of another arm's bridge; and the last setpoint is not repeated any more."""
+    muscle = Muscle(graph, republish_period=0.02)
+    muscle.ask(1.9, 1.5, 1.7)
+    graph.until(lambda: len(muscle.voltages) > 5, 'repeats')
+    publisher = graph.probe.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    graph.until(lambda: publisher.get_subscription_count() > 1, 'discovery')
+
+    def say(name):
+        publisher.publish(DiagnosticArray(status=[DiagnosticStatus(
+            name=name, values=[KeyValue(key='state', value='initialising')])]))
+        graph.spin(0.3)
+        before = len(muscle.voltages)
+        graph.spin(0.3)
+        return len(muscle.voltages) - before
+
+    assert say('other/hardware_bridge') > 0
+    assert say('hardware_bridge') == 0
+    count = len(muscle.voltages)
+    muscle.ask(1.7)
+    muscle.wait(count + 1)
+    assert muscle.voltages[-1] == pytest.approx(offline([1.7])[0], abs=1e-12)
 
 
 def test_reference_out_of_reach_is_saturated_with_the_expected_error(graph):

@@ -444,4 +444,3 @@ class _Diagnostician:
             name = next(iter(hidden))
             return f'to see {name}, too: {effects[name].experiment}'
         return 'nothing: the model explains this recording'
-

@@ -28,7 +28,8 @@ def verdict_in_words(found) -> str:
             parts.append(text)
         share = 100.0 * (1.0 - found.rmse_after / found.rmse_before)
         return ('Missing: ' + ' Also missing: '.join(parts)
-                + f' Adding {"them" if len(parts) > 1 else "it"} takes {share:.0f} % off the error.')
+                + f' Adding {"them" if len(parts) > 1 else "it"} takes {share:.0f} % off the '
+                'error.')
     if found.verdict == 'unknown':
         text = ('Unknown: something acts here that no effect of the catalogue explains '
                 f'({100.0 * found.unexplained:.0f} % of the mean square error).')

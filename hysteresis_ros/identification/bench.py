@@ -58,18 +58,19 @@ class Recipe:
         Kind of operator, see `fit_operator`.
     anchored : bool
         Whether the known cold state is met exactly.
-    options : dict
-        Further options of `fit_operator`.
+    plain : bool
+        Whether to do no more than the paper: cells only, no regularisation, grid as the data.
     """
 
     kind: str
     anchored: bool
-    options: dict
+    plain: bool
 
-    def fit(self, parts, target, groups, levels, anchor):
+    def fit(self, parts, target, groups, levels, anchor, placed):
         """Return operator and fit; the parameters are those of `fit_operator`."""
+        options = {'strength': 0.0, 'reversible': False} if self.plain else {'placed': placed}
         return fit_operator(self.kind, parts, target, groups, levels,
-                            anchor=anchor if self.anchored else None, **self.options)
+                            anchor=anchor if self.anchored else None, **options)
 
 
 def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray:
@@ -142,7 +143,7 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
         raise IdentificationError(f'levels must be positive, not {levels}')
     kind = 'preisach' if operator in ('two-stage', 'preisach') else operator
     some = length if length is not None else force
-    recipe = Recipe(kind, anchored, {'strength': 0.0, 'reversible': False} if plain else {})
+    recipe = Recipe(kind, anchored, plain)
     model = MuscleModel(
         'preisach' if operator == 'preisach' else 'two-stage', some.drive,
         length.load if loaded else None, length.response if length is not None else 'force',
@@ -192,11 +193,11 @@ def _force_stage(model, force, rows, levels, recipe):
     drive, target = force.column(model.drive), force.column('force')
     parts = [np.concatenate(([model.cold_drive], drive[part])) for _, part in _parts(force, rows)]
     return recipe.fit(parts, target[rows], force.column('trial')[rows], levels,
-                      (model.cold_drive, float(target[rows][0])))
+                      (model.cold_drive, float(target[rows][0])), placed=False)
 
 
 def _second_inputs(model, length, rows):
-    """Inputs of H2 for each trial, the cold one first."""
+    """Return the inputs of H2 for each trial, the cold one first."""
     drive = length.column(model.drive)
     load = length.column(model.load_name) if model.load_name else np.zeros(len(drive))
     parts = []
@@ -217,7 +218,9 @@ def _length_stage(model, length, rows, levels, recipe):
     """Fit H2 to length against F - H1[V]."""
     model.length_stage, fit = recipe.fit(
         _second_inputs(model, length, rows), length.column(model.response)[rows],
-        length.column('trial')[rows], levels, (0.0, 0.0))
+        length.column('trial')[rows], levels, (0.0, 0.0),
+        # The range of a drive is given; that of F - H1[V] is whatever the loads made it.
+        placed=model.force_stage is not None)
     return fit
 
 

@@ -8,13 +8,14 @@ hysteresis stages: each reference moves it once, in the order of arrival. While 
 the last setpoint is repeated, which does not move the memory, so that the watchdog behind
 `voltage_setpoint` does not end a long hold.
 
-Before the bridge's ``~/initialise`` heats and cools the muscle, call this node's ``~/reset``: the
-muscle's memory is wiped then, and the model's has to follow. A reset also ends the repeating, so
+When the diagnostics say that the bridge of the same arm has begun to heat and cool the muscle
+(``~/initialise``), the memory is wiped, too, as by ``~/reset``. That also ends the repeating, so
 nothing warms the muscle again between the cycle's end and the next reference.
 """
 
 import math
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float64
@@ -91,6 +92,9 @@ class CompensatorNode(Node):
         if needs_ambient(self._model):
             self.create_subscription(
                 Temperature, 'ambient_temperature', self._on_ambient, MEASUREMENTS)
+        self._bridge = f"{self.get_namespace().strip('/')}/hardware_bridge".lstrip('/')
+        self._initialising = False
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self.create_service(Trigger, '~/reset', self._on_reset)
 
     def _configure(self, parameters):
@@ -195,10 +199,24 @@ class CompensatorNode(Node):
     def _on_ambient(self, message):
         self._ambient = message.temperature
 
-    def _on_reset(self, request, response):
+    def _on_diagnostics(self, message):
+        """Forget when the bridge of the same arm begins its heat and cool cycle."""
+        for status in message.status:
+            if status.name != self._bridge:
+                continue
+            state = next((value.value for value in status.values if value.key == 'state'), '')
+            if state == 'initialising' and not self._initialising:
+                self._reset()
+                self.get_logger().info('the bridge heats and cools the muscle: memory wiped')
+            self._initialising = state == 'initialising'
+
+    def _reset(self):
         self._controller.reset()
         self._forget()
         self._diagnostics.clear('saturated')
+
+    def _on_reset(self, request, response):
+        self._reset()
         response.success = True
         response.message = 'memory wiped; the setpoint is repeated again from the next reference'
         self.get_logger().info(response.message)

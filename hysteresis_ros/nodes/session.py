@@ -131,7 +131,7 @@ class Processes:
 
 
 def _command(name: str) -> list:
-    """Executable of a node as `ros2 run` finds it, else the module."""
+    """Return how to start a node: its executable as `ros2 run` finds it, else the module."""
     for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
         path = Path(prefix) / 'lib' / 'hysteresis_ros' / name
         if prefix and path.is_file():
@@ -196,9 +196,9 @@ class Session(Node):
         self.wait(listening, processes, START_PATIENCE, 'the start of the nodes')
 
     def heat_and_cool(self, processes) -> None:
-        """Wipe the muscle's memory and the model's."""
-        for client, what in ((self._initialise, 'the heat and cool cycle'),
-                             (self._reset, 'the reset of the compensator')):
+        """Wipe the model's memory, then the muscle's; else it would be driven again."""
+        for client, what in ((self._reset, 'the reset of the compensator'),
+                             (self._initialise, 'the heat and cool cycle')):
             answer = client.call_async(Trigger.Request())
             self.wait(answer.done, processes, 4.0 * START_PATIENCE, what)
             if not answer.result().success:
