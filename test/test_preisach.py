@@ -512,6 +512,22 @@ def test_everett_function_and_its_solutions_end_with_the_plane():
         assert everett.beta(1e-15, corner, 1e-14) == (corner, 0.0)
 
 
+def test_rounding_does_not_send_a_solution_across_a_plateau():
+    # Two triangles on the diagonal with nothing between them.
+    everett = Everett(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    for excess in (-1e-15, 0.0, 1e-15):
+        # In the first cell from the corner, and in a later one.
+        assert everett.alpha(0.5 + excess, 0.0, 1e-14)[0] == pytest.approx(1.0)
+        assert everett.beta(0.5 + excess, 3.0, 1e-14)[0] == pytest.approx(2.0)
+        assert everett.alpha(0.125 + excess, 0.5, 1e-14)[0] == pytest.approx(1.0)
+        assert everett.beta(0.125 + excess, 2.5, 1e-14)[0] == pytest.approx(2.0)
+    assert everett.alpha(0.5 + 1e-6, 0.0, 1e-14)[0] > 2.0
+    assert everett.beta(0.5 + 1e-6, 3.0, 1e-14)[0] < 1.0
+    four = Everett(np.arange(5.0), np.array([0.0] * 4 + [1.0] + [0.0] * 4 + [1.0]))
+    assert four.alpha(0.5 + 1e-15, 0.0, 1e-14)[0] == pytest.approx(2.0)
+    assert four.beta(0.5 + 1e-15, 4.0, 1e-14)[0] == pytest.approx(3.0)
+
+
 # Files
 
 def test_parameters_survive_a_file_to_the_last_bit():
