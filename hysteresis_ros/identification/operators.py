@@ -8,13 +8,16 @@ import numpy as np
 from scipy import optimize
 
 from hysteresis_ros.errors import IdentificationError
-from hysteresis_ros.identification.least_squares import SLACK, Anchor, WeightFit, fit_weights
+from hysteresis_ros.identification.least_squares import (
+    SLACK, STRENGTHS, Anchor, WeightFit, fit_weights, quick_weights)
 from hysteresis_ros.operators import (
     BoucWen, HysteresisOperator, Linear, Preisach, PrandtlIshlinskii, cell_areas, cells,
     signed_areas, signed_lengths)
 
-# The grid reaches this far beyond the data, as a share of the data's range.
+# The grid reaches at least this far beyond the data, as a share of the data's range.
 MARGIN = 1e-6
+# And, where its place is searched for, up to one interval of the usual grid at either end.
+MARGINS = (0.0, 0.0125, 0.025, 0.0375, 0.05)
 # Of the penalty: density of the cells, and of the reversible weights, against its smoothness.
 CELL_RIDGE, REVERSIBLE_RIDGE = 0.1, 10.0
 # Rows that a search over parameters that are not weights looks at, besides the turning points.
@@ -24,7 +27,8 @@ SEARCH_ROWS = 400
 def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, groups: np.ndarray,
                  levels: int, anchor: tuple[float, float] | None = None,
                  strength: float | None = None, strengths: Sequence[float] | None = None,
-                 reversible: bool = True) -> tuple[HysteresisOperator, WeightFit | None]:
+                 reversible: bool = True,
+                 placed: bool = False) -> tuple[HysteresisOperator, WeightFit | None]:
     """
     Fit an operator that rises with its input.
 
@@ -49,6 +53,8 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
     reversible : bool
         Whether a Preisach operator gets reversible weights, for the part of its output without
         hysteresis: elastic stretch, a force that hardly loops. The paper's has none.
+    placed : bool
+        Whether a Preisach grid is moved to where its jumps suit the data best.
 
     Returns
     -------
@@ -69,6 +75,8 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
     options = {'groups': groups, 'strength': strength, 'strengths': strengths}
     if kind == 'preisach':
         nodes = np.linspace(low, high, levels + 1)
+        if placed:
+            nodes = _placed(parts, target, nodes, reversible)
         return fit_preisach(parts, target, nodes, anchor=anchor, reversible=reversible, **options)
     if kind == 'play':
         return _play(parts, target, low, high, levels, options)
@@ -133,17 +141,20 @@ def fit_preisach(parts, target, nodes, *, groups=None, anchor=None, reversible=T
                  strength=None, strengths=None) -> tuple[Preisach, WeightFit]:
     """Fit a Preisach operator on a given grid; the parameters are those of `fit_operator`."""
     rows = np.concatenate([preisach_rows(nodes, part, reversible)[1:] for part in parts])
-    scale = cell_areas(nodes)
-    if reversible:
-        scale = np.append(scale, np.diff(nodes))
     known = None if anchor is None else Anchor(
         preisach_rows(nodes, np.array([anchor[0]]), reversible)[0], anchor[1])
-    fit = fit_weights(rows, target, groups=groups, scale=scale, sign=1, strength=strength,
-                      strengths=strengths, slack=SLACK, penalty=smoothness(nodes, reversible),
-                      anchor=known)
+    fit = fit_weights(rows, target, groups=groups, scale=_scale(nodes, reversible), sign=1,
+                      strength=strength, strengths=strengths, slack=SLACK,
+                      penalty=smoothness(nodes, reversible), anchor=known)
     count = len(cell_areas(nodes))
     return Preisach(nodes, fit.weights[:count], fit.bias,
                     fit.weights[count:] if reversible else None), fit
+
+
+def _scale(nodes, reversible):
+    """Sizes of the cells, and of the diagonal's intervals."""
+    areas = cell_areas(nodes)
+    return np.append(areas, np.diff(nodes)) if reversible else areas
 
 
 def thinned(drive: np.ndarray, most: int) -> np.ndarray:
@@ -160,6 +171,36 @@ def thinned(drive: np.ndarray, most: int) -> np.ndarray:
     turns = np.flatnonzero(np.diff(np.sign(np.diff(drive)[moves])))
     keep[moves[turns] + 1] = True
     return np.flatnonzero(keep)
+
+
+def _fewer(parts, target):
+    """Return the inputs and outputs that a search looks at, of about `SEARCH_ROWS` rows."""
+    kept = [thinned(part, max(1, SEARCH_ROWS // len(parts))) for part in parts]
+    # Row n of a part is output n - 1 of its trial.
+    starts = np.cumsum([0] + [len(part) - 1 for part in parts[:-1]])
+    outputs = np.concatenate([start + rows[1:] - 1 for start, rows in zip(starts, kept)])
+    return [part[rows] for part, rows in zip(parts, kept)], target[outputs]
+
+
+def _placed(parts, target, nodes, reversible):
+    """
+    Return the grid, of those reaching a little beyond `nodes`, that fits the rows best.
+
+    The weight jumps only at nodes. Where the material changes fast, a shift by part of an
+    interval matters as much as a finer grid would, and costs nothing.
+    """
+    low, high, levels = nodes[0], nodes[-1], len(nodes) - 1
+    grids = [np.linspace(low - below * (high - low), high + above * (high - low), levels + 1)
+             for below in MARGINS for above in MARGINS]
+    parts, target = _fewer(parts, target)
+    errors, passive = [], None
+    for grid in grids:
+        rows = np.concatenate([preisach_rows(grid, part, reversible)[1:] for part in parts])
+        root = smoothness(grid, reversible)
+        weights, bias, passive = quick_weights(
+            rows, target, _scale(grid, reversible), STRENGTHS[0] * root.T @ root, passive)
+        errors.append(np.sqrt(np.mean((rows @ weights + bias - target) ** 2)))
+    return grids[int(np.argmin(errors))]
 
 
 def _play(parts, target, low, high, levels, options):
@@ -181,11 +222,7 @@ def _play(parts, target, low, high, levels, options):
 
 def _bouc_wen(parts, target, low, high):
     """Rate, shape and exponent by search; stiffness, gain and bias by linear least squares."""
-    kept = [thinned(part, SEARCH_ROWS // len(parts)) for part in parts]
-    # Row n of a part is output n - 1 of its trial.
-    starts = np.cumsum([0] + [len(part) - 1 for part in parts[:-1]])
-    outputs = target[np.concatenate([start + rows[1:] - 1 for start, rows in zip(starts, kept)])]
-    parts = [part[rows] for part, rows in zip(parts, kept)]
+    parts, outputs = _fewer(parts, target)
     inputs = np.concatenate([part[1:] for part in parts])
 
     def fit(vector):
