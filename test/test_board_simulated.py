@@ -178,6 +178,29 @@ def test_zero_sets_the_counter_to_zero():
     assert bench.telemetry().counts == -10
 
 
+def test_latch_counts_from_the_same_zero():
+    bench = Bench()
+    bench.arm.encoder_counts = bench.board._last_counts = 2700
+    bench.ask('zero')
+    bench.arm.encoder_counts = 2740
+    telemetry = bench.telemetry()
+    assert (telemetry.counts, telemetry.latch) == (40, 31)
+
+
+def test_full_and_no_duty_are_both_in_range():
+    bench = Bench()
+    bench.ask('enable')
+    assert bench.ask('set', duty=1.0) == bench.ask('set', duty=0.0) == []
+
+
+def test_arm_lives_on_without_power():
+    bench = Bench()
+    bench.ask('enable')
+    bench.ask('set', duty=1.0)
+    bench.board.idle(3)
+    assert bench.arm.voltages == [0.0, 0.0, 0.0] and bench.lines() == []
+
+
 @pytest.mark.parametrize('path', [(2700, 2740), (2760, 2720), (2700, 2740, 2720)])
 def test_index_pulse_is_latched_wherever_it_comes_from(path):
     bench = Bench()
