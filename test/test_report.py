@@ -1,0 +1,175 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The pages of a diagnosis and of an extension: they need nothing but themselves."""
+
+from html.parser import HTMLParser
+import re
+
+from model_support import arm_run, bicep_model, effect_of, wandering_voltage
+import pytest
+
+from hysteresis_ros.diagnosis.diagnose import Diagnosis
+from hysteresis_ros.diagnosis.extend import extend
+from hysteresis_ros.diagnosis.report import write_diagnosis, write_extension
+from hysteresis_ros.diagnosis.words import verdict_in_words
+from hysteresis_ros.measurements import Measurement
+
+NASTY = '<script>alert(1)</script>&run.csv'
+
+
+def run_of(model, seed):
+    """Return a settled run of the arm of a model, from a file with a nasty name."""
+    run = arm_run(wandering_voltage(400, seed)[::5])
+    return Measurement.from_columns({**run.columns, 'angle': model.predict(run)}, source=NASTY)
+
+
+@pytest.fixture(scope='module')
+def case():
+    """Return model, recordings and the extension by the payload that they lack."""
+    model = bicep_model()
+    arm = model.with_effects([effect_of(model, 'payload_error')])
+    train, test = run_of(arm, 1), run_of(arm, 2)
+    return model, train, test, extend(model, ['payload_error'], [train], [test])
+
+
+def row(effect, after, plausible=True):
+    """Return a row of the ranking."""
+    return {'effect': effect, 'rmse_before': 0.08, 'rmse_after': after,
+            'gain': 1.0 - after / 0.08, 'gain_low': 0.1, 'gain_high': 0.95, 'p_value': 0.002,
+            'parameters': {'dm': {'value': 15.0, 'low': 14.0, 'high': 16.0, 'unit': 'g'}},
+            'plausible': plausible, 'absorbed': 0.4, 'confused_with': []}
+
+
+def diagnosis(verdict='missing', **changes):
+    """Return what was found, without the search."""
+    content = {
+        'missing': ['payload_error'], 'alternatives': [['encoder_offset']],
+        'ranking': [row('payload_error', 0.002), row('supply_sag', 0.05, False)],
+        'noise_floor': 1e-3, 'structural_error': 5e-3, 'unexplained': 0.01,
+        'experiment': 'weigh the payload & the forearm', 'effects': [], 'rmse_before': 0.08,
+        'rmse_after': 0.002, 'not_excited': {'latency': 'every row is settled'}, 'event': None,
+        'signal': '', **changes}
+    return Diagnosis(verdict=verdict, **content)
+
+
+class Elements(HTMLParser):
+    """Collects the elements of a page and what they refer to."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.names, self.addresses, self.handlers = [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        """Note an element."""
+        self.names.append(tag)
+        for name, value in attrs:
+            if name in ('src', 'href', 'action', 'data'):
+                self.addresses.append(value)
+            if name.startswith('on'):
+                self.handlers.append(name)
+
+
+def check_self_contained(text):
+    """Nothing is fetched, nothing runs, and a phone shows it at its own width."""
+    elements = Elements(text)
+    assert 'script' not in elements.names and 'iframe' not in elements.names
+    assert elements.handlers == []
+    assert elements.addresses, 'a page without a picture'
+    assert all(address.startswith(('data:image/', '#')) for address in elements.addresses)
+    without_pictures = re.sub(r'data:image/[^"]*', '', text)
+    assert not re.search(r'https?://|@import|url\(', without_pictures)
+    assert 'name="viewport"' in text and '<!doctype html>' in text.lower()
+    assert '@media print' in text
+
+
+@pytest.fixture(scope='module')
+def found_page(case, tmp_path_factory):
+    """Return the page of a diagnosis."""
+    model, train, _, extension = case
+    path = tmp_path_factory.mktemp('page') / 'diagnosis.html'
+    write_diagnosis(path, model, [train], diagnosis(effects=extension.added), NASTY)
+    return path.read_text(encoding='utf-8')
+
+
+@pytest.fixture(scope='module')
+def extended_page(case, tmp_path_factory):
+    """Return the page of an extension."""
+    model, train, test, extension = case
+    path = tmp_path_factory.mktemp('page') / 'extended.html'
+    write_extension(path, model, extension, [train], [test], NASTY)
+    return path.read_text(encoding='utf-8')
+
+
+def test_the_page_of_a_diagnosis_needs_nothing_but_itself(found_page):
+    """No network, no script."""
+    check_self_contained(found_page)
+
+
+def test_the_page_of_an_extension_needs_nothing_but_itself(extended_page):
+    """No network, no script."""
+    check_self_contained(extended_page)
+
+
+def test_names_of_files_are_text(found_page, extended_page):
+    """What stands in angle brackets is shown and not obeyed."""
+    for text in (found_page, extended_page):
+        assert '<script' not in text
+        assert '&lt;script&gt;alert(1)&lt;/script&gt;&amp;run.csv' in text
+    assert 'weigh the payload &amp; the forearm' in found_page
+
+
+def test_the_verdict_comes_first(found_page):
+    """Then where it fails, the effects, the alternatives, what could not show, provenance."""
+    order = ['Missing: payload_error', 'What to do next', 'Where it fails',
+             'Effects, by what they do on rows not fitted', 'Alternatives',
+             'What this recording could not show', 'Before and after',
+             'What the error is made of', 'Provenance']
+    places = [found_page.index(words) for words in order]
+    assert places == sorted(places)
+    assert 'payload_error cannot be told from encoder_offset' in found_page
+    assert 'latency: every row is settled' in found_page
+
+
+def test_errors_are_in_degrees(found_page, extended_page, case):
+    """The page shows the unit that a person thinks in."""
+    assert 'RMSE [deg]' in found_page
+    said = re.search(r'Adding payload_error takes the error on the unseen recording from ([\d.]+) '
+                     r'to \S+ deg RMS', extended_page)
+    assert float(said[1]) == pytest.approx(57.29578 * case[3].test['rmse_before'], rel=0.02)
+
+
+def test_nothing_found_is_a_page_too(case, tmp_path):
+    """Without effects there is no before and after."""
+    model, train, _, _ = case
+    write_diagnosis(tmp_path / 'p.html', model, [train], diagnosis(
+        'adequate', missing=[], alternatives=[], ranking=[]), 'model.yaml')
+    text = (tmp_path / 'p.html').read_text(encoding='utf-8')
+    check_self_contained(text)
+    assert 'Adequate' in text and 'Before and after' not in text
+
+
+def test_a_value_outside_its_range_is_warned_of(case, tmp_path):
+    """It stands in for something else."""
+    model, train, _, extension = case
+    try:
+        extension.implausible.append('payload_error.dm')
+        write_extension(tmp_path / 'p.html', model, extension, [train], [], 'extended.yaml')
+    finally:
+        extension.implausible.clear()
+    text = (tmp_path / 'p.html').read_text(encoding='utf-8')
+    assert 'payload_error.dm is outside its physical range' in text
+
+
+@pytest.mark.parametrize('verdict, changes, words', [
+    ('missing', {}, ['payload_error', 'cannot tell it from encoder_offset', '98 % off']),
+    ('missing', {'missing': ['payload_error', 'backlash'], 'alternatives': [[], []]},
+     ['Also missing: backlash', 'Adding them']),
+    ('unknown', {'unexplained': 0.6, 'event': 1234.4}, ['60 %', 'happened at 1234 s']),
+    ('unknown', {'unexplained': 0.6, 'signal': 'cycles'}, ['shows in cycles', 'payload_error']),
+    ('not_excited', {}, ['moves too little']),
+    ('adequate', {}, ['no effect of the catalogue'])])
+def test_the_words_say_what_was_found(verdict, changes, words):
+    """Each verdict in a sentence that a person can act on."""
+    text = verdict_in_words(diagnosis(verdict, **changes))
+    assert all(word in text for word in words)
