@@ -55,13 +55,13 @@ def run(args):
         raise ParameterError('--values must be at least 4')
     if not 0.1 <= args.speed <= 200.0:
         raise ParameterError('--speed must be from 0.1 to 200')
+    hidden = drawn(args)
     folder = Path(args.output)
     if folder.exists() and not (folder / 'model.yaml').exists() and any(folder.iterdir()):
         raise ParameterError(f'{folder}: not empty and not a demo; name another folder with -o')
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     model = bench_model(args, folder)
-    hidden = drawn(args)
     sequences = target_sequences(model, args)
     result = {'runs': []}
     runs = drive(args, folder / 'run', sequences, folder / 'model.yaml', hidden)
@@ -106,8 +106,13 @@ def bench_model(args, folder):
 
 def drawn(args):
     """Return the effect to hide, or None."""
-    if args.hidden != 'random':
+    from hysteresis_ros.laboratory.effects import EFFECTS
+
+    if args.hidden is None or args.hidden in EFFECTS:
         return args.hidden
+    if args.hidden != 'random':
+        raise ParameterError(f'--hidden: there is no effect {args.hidden!r}; there are '
+                             + ', '.join(EFFECTS))
     return str(np.random.default_rng([args.seed, 77]).choice(DRAWN))
 
 
