@@ -1,0 +1,75 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""`hysteresis demo` as a user starts it: nodes as processes, a bag, a table, a picture."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hysteresis_ros.cli.main import main
+from hysteresis_ros.measurements import read_measurement
+
+VALUES = 6
+
+
+def test_the_demo_drives_the_arm_and_reads_its_bag_back(root, tmp_path, domain_id):
+    """Two sequences through the three nodes, each better than the linear model."""
+    pytest.importorskip('rclpy', reason='the nodes need ROS 2')
+    folder = tmp_path / 'demo'
+    paths = os.pathsep.join(filter(None, [str(root), os.environ.get('PYTHONPATH', '')]))
+    done = subprocess.run(
+        [sys.executable, '-m', 'hysteresis_ros', 'demo', '-o', str(folder), '--values',
+         str(VALUES), '--speed', '120', '--json', str(tmp_path / 'demo.json')],
+        env={**os.environ, 'PYTHONPATH': paths, 'ROS_DOMAIN_ID': str(domain_id)},
+        cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    log = folder / 'run.log'
+    assert done.returncode == 0, done.stderr + (log.read_text() if log.exists() else '')
+    assert 'sinusoidal' in done.stdout and 'Traceback' not in log.read_text()
+
+    bag = read_measurement(folder / 'run')
+    assert (bag.kind, bag.response, bag.drive) == ('arm', 'angle', 'voltage')
+    # Before the first heat and cool cycle the nodes only wait.
+    moved = [rows for _, rows in bag.split() if np.ptp(bag.column('voltage')[rows]) > 0.0]
+    assert len(moved) == 2
+    for rows in moved:
+        assert np.ptp(bag.column('angle')[rows]) > 0.2
+        assert np.ptp(bag.column('time')[rows]) > 30.0 * (VALUES - 1)
+
+    result = json.loads((tmp_path / 'demo.json').read_text(encoding='utf-8'))
+    run, linear = result['runs'][0], result['linear']
+    for sequence in ('sinusoidal', 'random'):
+        assert run[sequence]['mean_deg'] < 4.0
+        assert run[sequence]['mean_deg'] < linear[sequence]['mean_deg']
+    assert any(path.suffix == '.png' for path in folder.iterdir())
+
+
+def refused(capsys, *arguments):
+    """Run the demo, which has to fail, and return its one line."""
+    assert main(['demo', *arguments]) == 1
+    error = capsys.readouterr().err
+    assert error.count('\n') == 1 and 'Traceback' not in error
+    return error
+
+
+def test_a_foreign_folder_is_left_alone(tmp_path, capsys):
+    """Nothing is deleted that the demo has not made."""
+    (tmp_path / 'thesis.txt').write_text('years of work', encoding='utf-8')
+    assert 'not empty and not a demo' in refused(capsys, '-o', str(tmp_path))
+    assert (tmp_path / 'thesis.txt').read_text(encoding='utf-8') == 'years of work'
+
+
+def test_an_effect_that_does_not_exist_is_refused(tmp_path, capsys):
+    """The message says which there are."""
+    error = refused(capsys, '-o', str(tmp_path / 'demo'), '--hidden', 'gremlins', '--values', '4')
+    assert 'gremlins' in error and 'payload_error' in error
+
+
+@pytest.mark.parametrize('option, value', [('--values', '3'), ('--speed', '1000')])
+def test_numbers_out_of_range_are_refused(tmp_path, capsys, option, value):
+    """Before anything is written."""
+    assert option in refused(capsys, '-o', str(tmp_path / 'demo'), option, value)
+    assert not (tmp_path / 'demo').exists()
