@@ -13,6 +13,9 @@ from hysteresis_ros.diagnosis.fit import Fit
 from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue
 
+# A recorded temperature [degC] that changes by less is a constant with noise on it.
+SMALLEST_CHANGE = 0.5
+
 
 @dataclasses.dataclass
 class Candidate:
@@ -72,7 +75,7 @@ def possible(problem, known) -> tuple[list[str], dict[str, str]]:
         if effect.needs_transients and problem.settled:
             hopeless[name] = 'every row is settled'
         elif column and not any(
-                np.ptp(m.columns[column]) > 0.0 if column in m.columns else False
+                np.ptp(m.columns[column]) > SMALLEST_CHANGE if column in m.columns else False
                 for m in problem.measurements):
             hopeless[name] = f'{column} was not recorded or did not change'
         else:

@@ -191,7 +191,7 @@ class EndStop(MechanismEffect):
                   (0.9, 1.1, 1.3, 1.5, 1.7, 1.9, 2.1)),
         Parameter('side', '1', '1: the arm cannot go above the stop, -1: not below it', -1.0, 1.0,
                   0.0, (1.0, -1.0), choices=(-1.0, 1.0)),
-        Parameter('stiffness', 'N m/rad', 'stiffness of the stop', 0.1, 100.0, 0.0, (5.0,),
+        Parameter('stiffness', 'N m/rad', 'stiffness of the stop', 1.0, 100.0, 0.0, (5.0,),
                   log=True),)
 
     def forward(self, statics, geometry):
