@@ -87,6 +87,44 @@ def test_offset_is_added_to_the_length_whatever_the_load_does_to_the_stroke():
             base + share * factor * (stage.output - base) + offset, abs=1e-8)
 
 
+def test_offset_and_stroke_change_the_length_of_a_plain_muscle():
+    made = balance()
+    base, stage = made.base, made.operators[0]
+    for x, offset, factor in ((5.0, 1e-3, 1.0), (8.0, -1e-3, 0.9), (4.0, 5e-4, 1.05)):
+        theta = made.step(x, 30.0, offset, factor)
+        assert stage.input == pytest.approx(GEOMETRY.force(theta) - x, abs=1e-5)
+        assert GEOMETRY.length(theta) == pytest.approx(
+            base + factor * (stage.output - base) + offset, abs=1e-8)
+
+
+class Buckling(MaterialEffect):
+    """A cable that gives way about one load, so that the arm falls over."""
+
+    id = 'buckling'
+
+    def stretch(self, load, surroundings):
+        """Stretch about 7 N."""
+        return 1.5e-3 * np.exp(-((load - 7.0) / 0.15) ** 2)
+
+
+def test_an_arm_that_falls_over_comes_to_rest_on_the_other_side():
+    model = MODEL.with_effects([Buckling()])
+    made = model.balance(model.chain())
+    made.settle(0.5)
+    theta = np.linspace(LOW, HIGH, 4000)
+    demand = GEOMETRY.length(theta) - Buckling().stretch(GEOMETRY.force(theta), None)
+    start = int(np.argmax(np.diff(demand) < 0.0))
+    stop = start + 1 + int(np.argmax(demand[start + 1:] > demand[start]))
+    assert theta[stop] - theta[start] > 0.05
+    drive = np.linspace(0.5, 16.0, 300)
+    up = np.array([made.step(float(x), 30.0) for x in drive])
+    down = np.array([made.step(float(x), 30.0) for x in drive[::-1]])
+    for path in (up, down[::-1]):
+        assert path[0] > theta[stop] and path[-1] < theta[start]
+        assert np.all(np.diff(path) <= 1e-9)
+        assert not np.any((path > theta[start] + 4e-3) & (path < theta[stop] - 4e-3))
+
+
 @settings(max_examples=30)
 @given(st.lists(st.floats(-5.0, 25.0), min_size=1, max_size=15))
 def test_angle_follows_the_first_stage_one_way_and_is_always_a_number(sequence):
@@ -268,6 +306,22 @@ def test_unequal_muscles_share_the_load_of_brute_force():
         theta = optimize.brentq(lacking, 0.9, 2.3, xtol=1e-12)
         lacking(theta, commit=True)
         assert made.step(x, 30.0) == pytest.approx(theta, abs=2e-6)
+
+
+def test_friction_holds_unequal_muscles_by_what_they_pull_together():
+    made = balance('unequal_muscles', 'coulomb_friction')
+    offsets = (-0.6e-3, 0.0, 0.9e-3)
+    theta = made.step(6.0, 30.0)
+    leverage = 3.0 * GEOMETRY.moment_arm(theta)
+    tensions = []
+    for operator, excess in zip(made.operators, offsets):
+        assert operator.output == pytest.approx(GEOMETRY.length(theta) - excess, abs=1e-7)
+        tensions.append(operator.input + 6.0)
+    assert np.mean(tensions) == pytest.approx(
+        (GEOMETRY.load_moment(theta) + 0.02) / leverage, abs=1e-4)
+    width = 2.0 * 0.02 / leverage
+    assert made.step(6.0 - 0.98 * width, 30.0) == theta
+    assert made.step(6.0 - 1.02 * width, 30.0) > theta
 
 
 @given(st.lists(st.floats(-20.0, 20.0), min_size=1, max_size=4), st.floats(0.01, 30.0))

@@ -110,6 +110,19 @@ def test_overdriven_muscle_arrives_at_the_horizon_unless_limited(names, horizon)
     assert arrivals >= 1
 
 
+def test_a_muscle_is_overdriven_evenly_and_no_more_than_the_horizon_asks():
+    model = bicep_model(['thermal_lag'])
+    controller = model.controller(horizon=5.0)
+    reference = controller.reference(1.6)
+    voltage = controller.setpoint(*reference, 10.0).voltage
+    steady = model.controller(arm=True).setpoint(*reference).voltage
+    # V^2 = q + (q - q0) e / (1 - e) with e what is left after the horizon.
+    left = math.exp(-5.0 / 3.0)
+    assert voltage ** 2 == pytest.approx(steady ** 2 / (1.0 - left))
+    assert [controller.hold(10.0 + 0.5 * n) for n in range(1, 10)] == pytest.approx([voltage] * 9)
+    assert [controller.hold(15.0), controller.hold(15.5)] == pytest.approx([steady] * 2)
+
+
 def test_overdriving_latent_heat_never_goes_too_far():
     model = bicep_model(['latent_heat'])
     plain = model.controller(arm=True)
@@ -440,6 +453,32 @@ def test_a_model_without_a_first_stage_is_inverted_too():
         setpoint = controller.setpoint(length, 123.0)
         assert stage.step(-setpoint.voltage) == pytest.approx(setpoint.expected, abs=1e-12)
         assert setpoint.saturated == (abs(setpoint.error) > 1e-9)
+
+
+def test_clausius_clapeyron_instead_of_the_first_stage_is_inverted_too():
+    model = bicep_model()
+    model = model.with_effects([effect_of(model, 'stress_dependence', C=0.5, shift=0.1)])
+    angles, setpoints = drive_arm(model)
+    assert not any(setpoint.saturated for setpoint in setpoints)
+    np.testing.assert_allclose(angles, TARGETS, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize('names', [(), ('r_phase',)])
+def test_without_a_highest_drive_everything_the_muscle_can_do_is_within_reach(names):
+    model = bicep_model(names)
+    open_ended = model.controller(voltage_limits=(0.0, math.inf))
+    limited = model.controller()
+    for length in (-0.008, -0.012, -0.009):
+        assert open_ended.setpoint(length, 6.0) == limited.setpoint(length, 6.0)
+    assert open_ended.setpoint(-1.0, 6.0).saturated
+
+
+def test_horizon_can_be_changed_on_the_way():
+    controller = bicep_model(['thermal_lag']).controller()
+    steady = controller.setpoint(*controller.reference(1.6), 0.0).voltage
+    controller.horizon = 3.0
+    assert controller.horizon == 3.0
+    assert controller.setpoint(*controller.reference(1.6), 0.1).voltage > steady
 
 
 def test_a_muscle_that_extends_is_inverted_too():

@@ -175,6 +175,8 @@ def test_what_makes_no_sense_for_a_muscle_is_not_available():
         assert effects[name].available(current) and not effects[name].available(unloaded)
     for effect in effects.values():
         effect(unloaded)
+        effect()
+    assert effects['slack'].available(unloaded)
 
 
 class Hum(DriveEffect):
@@ -228,6 +230,49 @@ class Swelling(MaterialEffect):
     def drift(self, drive, heat, inputs, surroundings):
         """Grow."""
         return self.rate * inputs.time, np.ones(len(drive))
+
+
+class Ratchet(MaterialEffect):
+    """A user's effect of the material with a past, defined by `advance` alone."""
+
+    id = 'ratchet'
+    sentence = equation = source = shows_in = experiment = 'Each row adds a little.'
+    parameters = (Parameter('tooth', 'm', 'per row', 1e-6, 1e-3, 0.0, (1e-5,)),)
+    memory = ('_teeth',)
+
+    def start(self):
+        """Forget."""
+        self._teeth = 0
+
+    def advance(self, drive, heat, inputs, surroundings):
+        """Click."""
+        self._teeth += 1
+        return self.tooth * self._teeth, 1.0
+
+
+class Scale(SensorEffect):
+    """A user's effect of the sensor without a past, defined by `forward` alone."""
+
+    id = 'scale'
+    sentence = equation = source = shows_in = experiment = 'It counts too much.'
+    parameters = (Parameter('more', '1', 'too much', 0.01, 0.1, 0.0, (0.05,)),)
+
+    def forward(self, response, inputs):
+        """Count."""
+        return response * (1.0 + self.more)
+
+
+@pytest.mark.parametrize('effect', [Ratchet(tooth=2e-5), Scale(more=0.03), Drag(share=0.3)])
+def test_one_map_of_a_users_effect_is_enough(effect):
+    voltage = wandering_voltage(30)
+    run = arm_run(voltage, 1.0)
+    model = bicep_model().with_effects([effect])
+    predicted = model.predict(run)
+    assert np.max(np.abs(predicted - bicep_model().predict(run))) > 0.01
+    observer = model.observer()
+    observer.reset(0.0)
+    np.testing.assert_allclose(
+        [observer.step(t, v) for t, v in zip(run.time, voltage)], predicted, atol=1e-12)
 
 
 @pytest.fixture

@@ -52,7 +52,7 @@ def test_round_trip_is_exact(tmp_path):
         assert getattr(loaded, name) == getattr(model, name)
     assert [e.values for e in loaded.effects] == [e.values for e in model.effects]
     assert [e.intervals for e in loaded.effects] == [e.intervals for e in model.effects]
-    run = arm_run(wandering_voltage(40), 0.5)
+    run = arm_run(wandering_voltage(10), 0.5)
     np.testing.assert_array_equal(loaded.predict(run), model.predict(run))
 
 
@@ -159,6 +159,13 @@ def test_what_is_no_model_file_is_refused_and_runs_nothing(tmp_path, monkeypatch
     (tmp_path / 'model.yaml').write_text(text)
     refused(tmp_path / 'model.yaml', 'not a model file')
     assert [entry.name for entry in tmp_path.iterdir()] == ['model.yaml']
+
+
+def test_a_model_that_refers_to_itself_is_refused(path):
+    text = path.read_text()
+    start, stop = text.index('metrics:'), text.index('effects:')
+    path.write_text(text[:start] + 'metrics: &all {again: *all}\n' + text[stop:])
+    refused(path, 'not a model file', 'references')
 
 
 def test_bytes_that_are_no_text_are_refused(tmp_path):
