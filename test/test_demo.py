@@ -32,9 +32,9 @@ def test_the_demo_drives_the_arm_and_reads_its_bag_back(root, tmp_path, domain_i
 
     bag = read_measurement(folder / 'run')
     assert (bag.kind, bag.response, bag.drive) == ('arm', 'angle', 'voltage')
-    # Before the first heat and cool cycle the nodes only wait.
-    moved = [rows for _, rows in bag.split() if np.ptp(bag.column('voltage')[rows]) > 0.0]
-    assert len(moved) == 2
+    # What comes before the first heat and cool cycle, if anything, is no sequence.
+    assert len(bag.trials) in (2, 3)
+    moved = [rows for _, rows in bag.split()][-2:]
     for rows in moved:
         assert np.ptp(bag.column('angle')[rows]) > 0.2
         assert np.ptp(bag.column('time')[rows]) > 30.0 * (VALUES - 1)
