@@ -1,0 +1,169 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Effects hidden in the virtual laboratory's arm: found, named, and added, or called unknown."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.cli.diagnose import to_text
+from hysteresis_ros.diagnosis import diagnose as diagnosis
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.extend import extend, rmse
+from hysteresis_ros.effects import catalogue
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.identification.effects import add_effects
+from hysteresis_ros.laboratory.linkage import GEOMETRY
+from hysteresis_ros.laboratory.protocols import protocol_tables
+from hysteresis_ros.measurements import Measurement
+
+SEED = 11
+RANKED = {'effect', 'rmse_before', 'rmse_after', 'gain', 'gain_low', 'gain_high', 'p_value',
+          'parameters', 'plausible', 'absorbed', 'confused_with'}
+# What a lag in continuous recordings could be mistaken for.
+RIVALS = ('thermal_lag', 'airflow', 'creep', 'viscous_friction', 'encoder_offset', 'latency')
+
+
+@pytest.fixture(scope='module')
+def model():
+    """Return the model of a bench on which nothing is hidden."""
+    tables = protocol_tables('bench', {}, SEED)
+    force, length = (Measurement.from_columns(tables[name], source=name)
+                     for name in ('force.csv', 'length.csv'))
+    trials = {'length_trials': range(4), 'force_trials': [0]}
+    base = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
+    found, added = add_effects(base, length, force,
+                               ['stress_dependence', 'stress_dependent_strain'], **trials)
+    assert len(added) == 2
+    return found
+
+
+def recordings(effects, protocol='arm-steps', trials=(0, 1), every=1):
+    """Return some trials of the recording to diagnose, and the whole one that nothing has seen."""
+    tables = protocol_tables(protocol, effects, SEED)
+    train, test = (Measurement.from_columns(
+        {column: values[::every] for column, values in tables[name].items()}, source=name)
+        for name in ('train.csv', 'test.csv'))
+    return train.select(trials), test
+
+
+def reported(found):
+    """Return the set of effects that a person has to think of."""
+    return set(found.missing).union(*found.alternatives)
+
+
+def check_json(found):
+    """The names and types that programs rely on."""
+    content = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert content['verdict'] in ('adequate', 'missing', 'unknown', 'not_excited')
+    assert set(content['missing']) <= set(catalogue())
+    assert len(content['alternatives']) == len(content['missing'])
+    for row in content['ranking']:
+        assert set(row) == RANKED
+        assert row['gain_low'] <= row['gain_high'] and 0.0 < row['p_value'] <= 1.0
+        assert 0.0 <= row['absorbed'] <= 1.0 and isinstance(row['plausible'], bool)
+        assert row['gain'] == pytest.approx(1.0 - row['rmse_after'] / row['rmse_before'])
+        assert row['effect'] not in row['confused_with']
+        for entry in row['parameters'].values():
+            assert set(entry) >= {'value', 'low', 'high', 'unit'}
+            assert entry['low'] <= entry['high']
+    assert content['noise_floor'] >= 0.0 and 0.0 <= content['unexplained'] <= 1.0
+    assert isinstance(content['experiment'], str) and content['experiment']
+
+
+def test_nothing_is_named_where_nothing_is_hidden(model):
+    """A model that is as good as its bench said is adequate."""
+    train, _ = recordings({})
+    found = diagnose(model, [train], seed=SEED)
+    assert (found.verdict, found.missing, found.alternatives) == ('adequate', [], [])
+    assert found.effects == [] and found.rmse_after == found.rmse_before
+    assert 'thermal_lag' in found.not_excited        # every row is settled
+    assert 'Adequate' in to_text(found, 'angle')
+    check_json(found)
+
+
+def test_a_heavier_payload_is_named_first_and_added(model):
+    """With it the unseen recording is as good as one without anything hidden."""
+    train, test = recordings({'payload_error': 1.0})
+    found = diagnose(model, [train], seed=SEED)
+    assert found.verdict == 'missing' and found.missing[0] == 'payload_error'
+    assert found.ranking[0]['effect'] == 'payload_error'
+    assert found.rmse_after < 0.2 * found.rmse_before
+    low, high = found.effects[0].intervals['dm']
+    assert low < found.effects[0].values['dm'] < high
+    check_json(found)
+    assert 'Missing: payload_error' in to_text(found, 'angle')
+
+    _, clean = recordings({})
+    extended = extend(model, found.missing, [train]).model
+    assert rmse(model, [test]) > 5.0 * rmse(model, [clean])
+    assert rmse(extended, [test]) < 1.3 * rmse(model, [clean])
+
+
+@pytest.mark.parametrize('name', ['encoder_offset', 'backlash'])
+def test_effects_of_sensor_and_mechanism_are_in_the_reported_set(model, name):
+    """Which is small enough to act on."""
+    train, test = recordings({name: 1.0})
+    found = diagnose(model, [train], seed=SEED)
+    assert found.verdict == 'missing'
+    assert name in reported(found)
+    assert len(reported(found)) <= 4
+    extended = extend(model, found.missing, [train]).model
+    assert rmse(extended, [test]) < 0.4 * rmse(model, [test])
+    check_json(found)
+
+
+def test_a_lag_shows_in_transients(model, monkeypatch):
+    """In a continuous recording, among what could be mistaken for it."""
+    possible = diagnosis.possible
+
+    def fewer(problem, known):
+        names, hopeless = possible(problem, known)
+        assert set(RIVALS) <= set(names)
+        return [name for name in names if name in RIVALS], hopeless
+    monkeypatch.setattr(diagnosis, 'possible', fewer)
+    train, _ = recordings({'thermal_lag': 1.0}, 'arm-dynamic', every=5)
+    assert not train.settled
+    found = diagnose(model, [train], seed=SEED)
+    assert found.verdict == 'missing' and 'thermal_lag' in reported(found)
+    assert found.rmse_after < 0.5 * found.rmse_before
+    check_json(found)
+
+
+def test_what_no_catalogue_has_is_called_unknown(model):
+    """A bench shaken by a machine: no name is forced on it."""
+    train, _ = recordings({'unlisted_shaken_bench': 1.0})
+    found = diagnose(model, [train], seed=SEED)
+    assert found.verdict == 'unknown'
+    assert found.unexplained > 0.3
+    assert 'Unknown' in to_text(found, 'angle')
+    check_json(found)
+
+
+def test_a_recording_that_hardly_moves_is_not_called_adequate(model):
+    """Rows at one voltage cannot show what a working arm would."""
+    train, _ = recordings({})
+    rows = 24
+    still = {name: np.repeat(values[:1], rows) for name, values in train.columns.items()}
+    still.update(time=30.0 * np.arange(1.0, rows + 1.0), trial=np.zeros(rows))
+    still['voltage'] = np.zeros(rows)
+    found = diagnose(model, [Measurement.from_columns(still)], seed=SEED)
+    assert found.verdict in ('not_excited', 'unknown', 'missing') or found.not_excited
+    assert not any(math.isnan(row['rmse_after']) for row in found.ranking)
+    check_json(found)
+
+
+def test_the_same_recording_gives_the_same_verdict_whatever_the_jobs(model, monkeypatch):
+    """Random draws are seeded, and workers return what the process itself would."""
+    possible = diagnosis.possible
+    monkeypatch.setattr(diagnosis, 'possible', lambda problem, known: (
+        ['payload_error', 'encoder_offset'], possible(problem, known)[1]))
+    train, _ = recordings({'payload_error': 1.0})
+    one, two = (diagnose(model, [train], jobs=jobs, seed=3).to_json() for jobs in (1, 2))
+    assert one == two
+    assert set(one) >= {field.name for field in dataclasses.fields(diagnosis.Diagnosis)} - {
+        'effects'}
