@@ -40,7 +40,9 @@ def run(args):
                      progress=lambda items, total: progress(items, 'effects', total))
     say(args, to_text(found, measurements[-1].response))
     if args.json:
-        write_json(args.json, found.to_json())
+        from hysteresis_ros.diagnosis.compare import compare
+        where = compare(model, measurements).to_json()['where']
+        write_json(args.json, {**found.to_json(), 'where': where})
     if args.report:
         from hysteresis_ros.diagnosis.report import write_diagnosis
         write_diagnosis(args.report, model, measurements, found, args.model)
