@@ -50,7 +50,7 @@ def test_a_vector_gives_back_the_values_it_was_made_of(name):
         parameters = ParameterVector([effect], kind)
         again, = parameters.with_vector(parameters.vector())
         fitted = [parameter.name for _, parameter in parameters.entries
-                  if kind == 'arm' or parameter.name in STRENGTHS[name]]
+                  if parameter.name in STRENGTHS[name]]
         for each in fitted:
             assert again.values[each] == pytest.approx(effect.values[each], rel=1e-9)
         assert np.all(parameters.lower < parameters.upper)

@@ -60,7 +60,7 @@ RANGES = {
     ('thermal_lag', 'time_constant'): ('s', 1.0, 10.0),
     ('heating_cooling_asymmetry', 'ratio'): ('1', 0.5, 2.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
     ('creep', 'c'): ('% of l0', 0.01, 0.5), ('slack', 'Ls'): ('mm', 0.1, 5.0),
-    ('series_compliance', 'compliance'): ('mm/N', 1.0 / 200.0, 1.0 / 2.0),
+    ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),
     ('coulomb_friction', 'tau_c'): ('N m', 0.001, 0.150),
     ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 5., 100.),
     ('clamp_mass', 'moment'): ('g m', 5.0 * 0.020, 30.0 * 0.050),

@@ -22,17 +22,33 @@ def effect(name, surroundings=WIRE, **values):
     return catalogue()[name](surroundings, **values)
 
 
-def inputs(time, cycles=None):
+def inputs(time, cycles=None, phase=None):
     """Rows of one trial at these times."""
     time = np.asarray(time, dtype=float)
     none = np.full(len(time), np.nan)
-    return Inputs(time, time, np.diff(time, prepend=0.0), none, none,
+    return Inputs(time, time, np.diff(time, prepend=0.0), none,
+                  none if phase is None else np.asarray(phase, dtype=float),
                   np.zeros(len(time)) if cycles is None else np.asarray(cycles, dtype=float))
 
 
 def test_stress_dependence_weighs_the_load_more_about_the_bench_mean():
     made = effect('stress_dependence', shift=0.2)
     np.testing.assert_allclose(LOADS + made.shift_load(LOADS, WIRE), 1.2 * LOADS - 0.6)
+
+
+def test_another_shift_than_on_the_bench_leaves_the_unloaded_muscle_as_it_is():
+    made = effect('stress_dependence', C=0.5, shift=0.2)
+    np.testing.assert_allclose(LOADS + made.shift_load(LOADS, WIRE), 1.2 * LOADS)
+
+
+@pytest.mark.parametrize('r, there', [(0.0, 3.0), (0.5, 0.0)])
+def test_growth_of_the_stroke_on_the_arm_counts_from_where_the_bench_model_is_right(r, there):
+    plain, grown = (effect('stress_dependent_strain', r=r, F0=1.2, growth=growth)
+                    for growth in (0.0, 0.2))
+    at = np.array([there])
+    np.testing.assert_allclose(grown.scale(at, WIRE), plain.scale(at, WIRE))
+    more = grown.scale(LOADS, WIRE) - plain.scale(LOADS, WIRE)
+    assert np.all(np.diff(more) > 0.0) and np.all((more > 0.0) == (LOADS > there))
 
 
 @pytest.mark.parametrize('drive, load, unit, low, high, per_heat', [
@@ -79,7 +95,7 @@ def test_compliance_stretches_in_proportion_to_the_load(response, load, unit, fa
     surroundings = WIRE._replace(response=response, load_name=load)
     made = effect('series_compliance', surroundings, compliance=0.1)
     assert made.parameters[0].unit == unit
-    np.testing.assert_allclose(made.stretch(LOADS, surroundings), 0.1 * factor * (LOADS - 3.0))
+    np.testing.assert_allclose(made.stretch(LOADS, surroundings), 0.1 * factor * LOADS)
 
 
 def test_compliance_is_the_same_wire_in_every_unit():
@@ -130,10 +146,11 @@ def test_r_phase_is_a_step_with_a_narrow_loop():
 def test_creep_goes_on_with_the_logarithm_of_time_in_the_direction_of_the_step():
     made = effect('creep', c=0.1, t0=2.0)
     volts = np.array([3.0, 3.0, 3.0, 1.0, 1.0])
-    offset, factor = made.drift(volts, volts ** 2, inputs([1.0, 2.0, 7.0, 8.0, 12.0]), WIRE)
+    trial = inputs([1.0, 2.0, 7.0, 8.0, 12.0], phase=[0.4, 0.4, 0.4, 0.7, 0.7])
+    offset, factor = made.drift(volts, volts ** 2, trial, WIRE)
     unit = 0.001 * 0.27
-    expected = [0.0, -unit * 0.5 * math.log1p(1.0 / 2.0), -unit * 0.5 * math.log1p(6.0 / 2.0),
-                0.0, unit * (2.0 / 6.0) * math.log1p(4.0 / 2.0)]
+    expected = [0.0, -unit * 0.6 * math.log1p(1.0 / 2.0), -unit * 0.6 * math.log1p(6.0 / 2.0),
+                0.0, unit * 0.3 * math.log1p(4.0 / 2.0)]
     np.testing.assert_allclose(offset, expected, atol=1e-18)
     assert np.all(factor == 1.0)
 
@@ -141,21 +158,26 @@ def test_creep_goes_on_with_the_logarithm_of_time_in_the_direction_of_the_step()
 def test_a_ramp_of_small_steps_creeps_like_its_whole():
     made = effect('creep', c=0.1, t0=2.0)
     volts = np.array([0.5, 1.0, 1.5, 2.0, 2.0])
-    offset, _ = made.drift(volts, volts ** 2, inputs([1, 2, 3, 4, 9]), WIRE)
-    assert offset[-1] == pytest.approx(-0.001 * 0.27 * (2.0 / 6.0) * math.log1p(5.0 / 2.0))
+    trial = inputs([1, 2, 3, 4, 9], phase=[1.0, 0.9, 0.7, 0.6, 0.6])
+    offset, _ = made.drift(volts, volts ** 2, trial, WIRE)
+    assert offset[-1] == pytest.approx(-0.001 * 0.27 * 0.4 * math.log1p(5.0 / 2.0))
 
 
-def test_nothing_creeps_before_the_first_step():
-    offset, _ = effect('creep', c=0.1).drift(np.zeros(3), np.zeros(3), inputs([1, 9, 99]), WIRE)
+def test_nothing_creeps_before_the_first_step_or_where_the_phase_is_not_known():
+    made = effect('creep', c=0.1)
+    offset, _ = made.drift(np.zeros(3), np.zeros(3), inputs([1, 9, 99], phase=[1, 1, 1]), WIRE)
+    assert np.all(offset == 0.0)
+    offset, _ = made.drift(np.full(3, 4.0), np.full(3, 16.0), inputs([1, 9, 99]), WIRE)
     assert np.all(offset == 0.0)
 
 
 @pytest.mark.parametrize('name', ['creep', 'r_phase'])
 def test_a_muscle_that_extends_goes_the_other_way(name):
     volts = np.array([4.0, 4.0, 1.0, 1.0])
+    trial = inputs([1, 5, 6, 20], phase=[0.3, 0.3, 0.8, 0.8])
     contracts, extends = (
         effect(name, WIRE._replace(sign=sign), **STRENGTHS[name]).drift(
-            volts, volts ** 2, inputs([1, 5, 6, 20]), WIRE._replace(sign=sign))[0]
+            volts, volts ** 2, trial, WIRE._replace(sign=sign))[0]
         for sign in (-1, 1))
     np.testing.assert_allclose(extends, -contracts)
     assert contracts[1] < 0.0
@@ -169,7 +191,8 @@ def test_row_by_row_is_the_same_as_the_whole_trial(rows, name):
         volts.append(volts[-1] if held else value)
         steps.append(step)
     volts = np.array(volts[1:])
-    trial = inputs(np.cumsum(steps), np.cumsum(np.abs(np.diff(volts, prepend=0.0))) / 12.0)
+    trial = inputs(np.cumsum(steps), np.cumsum(np.abs(np.diff(volts, prepend=0.0))) / 12.0,
+                   1.0 - volts / 6.0)
     made = effect(name, **STRENGTHS[name])
     offset, factor = made.drift(volts, volts ** 2, trial, WIRE)
     made.start()
@@ -190,7 +213,7 @@ def test_effects_of_the_load_add_up_and_strokes_multiply():
                    effect('stress_dependent_strain', r=0.6, F0=1.5),
                    effect('series_compliance', compliance=0.1), effect('slack', Ls=1.0)], WIRE)
     np.testing.assert_allclose(chain.load_inside(LOADS), 1.1 * LOADS - 0.3)
-    np.testing.assert_allclose(chain.stretch(LOADS), 1e-3 + 1e-4 * (LOADS - 3.0))
+    np.testing.assert_allclose(chain.stretch(LOADS), 1e-3 + 1e-4 * LOADS)
     np.testing.assert_allclose(
         chain.scale(LOADS), effect('stress_dependent_strain', r=0.6, F0=1.5).scale(LOADS, WIRE))
     assert chain.load_per_heat() == 0.0
@@ -231,7 +254,7 @@ def test_length_table_follows_the_relation_of_the_material():
         worn = math.log1p(travel / 12.0)
         length = (base + share * (1.0 - 0.02 * worn)
                   * (stage.step(inside - first.step(value)) - base)
-                  + 0.05e-3 * (force - 3.0) + 0.5e-3 - 0.0005 * 0.27 * worn)
+                  + 0.05e-3 * force + 0.5e-3 - 0.0005 * 0.27 * worn)
         assert predicted[n] == pytest.approx(length, abs=1e-12)
 
 

@@ -9,7 +9,6 @@ have them; the truth is used for the score only. `make hidden` runs the whole gr
 """
 
 import argparse
-import functools
 import itertools
 import json
 from pathlib import Path
@@ -54,7 +53,6 @@ def cases(seeds, others, quick=False):
     return found
 
 
-@functools.lru_cache(maxsize=8)
 def base_model(seed, material):
     """Identify the bench of the specimen, on which nothing is hidden."""
     from hysteresis_ros.bicep import BicepGeometry
@@ -74,8 +72,8 @@ def base_model(seed, material):
     return model
 
 
-def run(case, material):
-    """Diagnose one case and return what is scored."""
+def run(case, model):
+    """Diagnose one case with the model of its specimen and return what is scored."""
     from hysteresis_ros.diagnosis.diagnose import diagnose
     from hysteresis_ros.diagnosis.extend import extend, rmse
     from hysteresis_ros.laboratory.protocols import protocol_tables
@@ -83,7 +81,6 @@ def run(case, material):
 
     group, protocol, effects, seed = case
     started = time.perf_counter()
-    model = base_model(seed, material)
     train, test = (Measurement.from_columns(protocol_tables(protocol, effects, seed)[name])
                    for name in ('train.csv', 'test.csv'))
     found = diagnose(model, [train], seed=seed)
@@ -154,7 +151,11 @@ def main():
         chosen = [case for case in chosen if args.only in (case[0], *case[2])]
     results = []
     parallel = joblib.Parallel(n_jobs=args.jobs, return_as='generator')
-    for row in parallel(joblib.delayed(run)(case, not args.paper_model) for case in chosen):
+    seeds = sorted({case[-1] for case in chosen})
+    models = dict(zip(seeds, parallel(
+        joblib.delayed(base_model)(seed, not args.paper_model) for seed in seeds)))
+    print(f'{len(models)} specimens identified', file=sys.stderr, flush=True)
+    for row in parallel(joblib.delayed(run)(case, models[case[-1]]) for case in chosen):
         results.append(row)
         print(f'{len(results)}/{len(chosen)} {row["group"]} {row["protocol"]} {row["truth"]} '
               f'seed {row["seed"]}: {row["verdict"]} {row["missing"]} {row["alternatives"]} '

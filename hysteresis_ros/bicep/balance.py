@@ -6,8 +6,9 @@ The balance between muscle and arm: the angle for a drive and a memory.
 The muscle stretches to ``L = L0 + S(F) f (H2[u] - L0) + e(F) + o`` with ``u = F - x``, where x is
 the first stage's output (H1[V] in the paper's model) and F is what the arm asks for at its angle.
 At rest ``L(theta) = H2[F(theta) - x]``; the unknown is u, because H2 then gives everything else.
-Dry friction lets F lie in a band, inside which the arm sticks; viscous friction and inertia add
-what the present velocity and acceleration cost (implicit Euler), which S and e leave out.
+Dry friction lets F lie in a band, inside which the arm sticks; viscous friction and inertia (`swing`)
+add what the present velocity and acceleration cost: by backward differences, of second order over
+equal steps.
 """
 
 import bisect
@@ -19,15 +20,21 @@ from scipy import optimize
 
 from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.bicep.root import bracket, illinois
+from hysteresis_ros.bicep.swing import Swing
 from hysteresis_ros.effects.stages import Statics
 
 # Between two angles of the grid the linkage is a straight line, which costs less than 1e-6 rad.
 GRID = math.radians(0.1)
 # A step longer than this is a settled state to which dynamics contribute nothing.
 LONGEST_TRANSIENT = 5.0
-# Longest step for which implicit Euler still shows an arm that rings (its period is about 1 s).
-LONGEST_INERTIAL_STEP = 0.02
-MOST_ITERATIONS = 60
+# Longest step that still shows how an arm rings (its period is about 0.5 s).
+LONGEST_INERTIAL_STEP = 0.034
+# An arm slower than this [rad/s], under a step of x of less than this share of H2's range, does
+# not ring, and is followed in longer steps.
+CALM_SPEED, CALM_STEP, FADING = 0.02, 0.003, 0.7
+# How exactly the share of its friction is known that an arm at rest makes use of.
+STUCK_TOLERANCE = 1e-10
 
 
 class ArmBalance:
@@ -58,15 +65,20 @@ class ArmBalance:
         leverage = geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6)
         self.base = operator.output_range[0]
         self._theta = theta.tolist()
-        # Lines of state for an arm that slides down, rests, and slides up.
+        # Lines of state for an arm that rises, rests, and sinks.
         self._lines = {drag: _Line(statics, leverage, drag * self.coulomb, self.base, chain, loaded)
                        for drag in ((-1, 0, 1) if self.coulomb > 0.0 else (0,))}
         # Whether what the muscle has to give does not depend on friction.
         self._rigid = all(line.demand == self._lines[0].demand for line in self._lines.values())
         self.has_dynamics = self.viscous > 0.0 or self.inertia > 0.0
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
+        self._calm = CALM_STEP * (operator.upper - operator.lower)
         self._bundle = Bundle(operator, chain.offsets) if len(chain.offsets) > 1 else None
         self.operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
+        self._swing = None
+        if self.has_dynamics and loaded and self._bundle is None:
+            self._swing = Swing(statics, leverage, chain, self.base, self.viscous, self.inertia,
+                                1e3 * self.tolerance)
         self.start()
 
     def start(self) -> None:
@@ -75,7 +87,9 @@ class ArmBalance:
             operator.reset()
         self._gain = 1.5
         self._angle = self._inputs = None
-        self._velocity = 0.0
+        self._velocity, self._before = 0.0, None
+        self._x = math.inf
+        self._motion = 0.0
 
     def settle(self, x: float) -> float:
         """Take up the state of rest under `x`, the cold one, and return its angle [rad]."""
@@ -100,12 +114,17 @@ class ArmBalance:
         float
             Angle [rad].
         """
-        if self.inertia > 0.0 and LONGEST_INERTIAL_STEP < dt < LONGEST_TRANSIENT:
+        if self.inertia > 0.0 and LONGEST_INERTIAL_STEP < dt < LONGEST_TRANSIENT and (
+                abs(x - self._x) > self._calm or self._motion > CALM_SPEED):
             pieces = math.ceil(dt / LONGEST_INERTIAL_STEP)
             for _ in range(pieces - 1):
                 self._advance(x, dt / pieces, offset, factor)
             dt /= pieces
-        return self._advance(x, dt, offset, factor)
+        self._x = x
+        angle = self._advance(x, dt, offset, factor)
+        # A ringing arm stands still for a moment where it turns.
+        self._motion = max(abs(self._velocity), FADING * self._motion)
+        return angle
 
     def _advance(self, x, dt, offset, factor):
         moving = self.has_dynamics and dt < LONGEST_TRANSIENT and self._angle is not None
@@ -113,18 +132,28 @@ class ArmBalance:
             return self._angle
         dt = dt if moving else 0.0
         drag = 0
-        if self.coulomb > 0.0 and self._angle is not None:
-            drag = self._direction(x, offset, factor, dt)
+        if self.coulomb > 0.0:
+            # At the start the arm has sunk to where it rests, and friction has held it up.
+            drag = 1 if self._angle is None else self._direction(x, offset, factor, dt)
             if drag == 0:
-                self._velocity = 0.0
+                self._keep_motion(self._angle, 0.0)
                 return self._angle
-        line = self._lines[drag]
-        solve = self._solve if self._bundle is None else self._solve_bundle
-        k, share = line.place(solve(line, x, offset, factor, dt), offset)
-        angle = self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
-        self._velocity = (angle - self._angle) / dt if moving else 0.0
+        if moving and self._swing is not None:
+            angle = self._swing.step(self.operators[0], x, offset, factor, drag * self.coulomb,
+                                     lambda theta: self._moved(theta, dt))
+        else:
+            angle = self._rest(self._lines[drag], x, offset, factor, dt)
+        self._keep_motion(angle, dt)
         self._angle = angle
         return angle
+
+    def _rest(self, line, x, offset, factor, dt):
+        if self._bundle is None:
+            given = self._solve(line, x, offset, factor)
+        else:
+            given = self._solve_bundle(line, x, offset, factor, dt)
+        k, share = line.place(given, offset)
+        return self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
 
     def _direction(self, x, offset, factor, dt):
         """Direction in which the arm slides, 0 where friction holds it."""
@@ -152,7 +181,7 @@ class ArmBalance:
             return 1
         if lacking(-1.0) < 0.0:
             return -1
-        lacking(optimize.brentq(lacking, -1.0, 1.0, xtol=1e-13))
+        lacking(optimize.brentq(lacking, -1.0, 1.0, xtol=STUCK_TOLERANCE))
         # The arm stands still, but its load has changed, and with it what the load does.
         self._commit(found['inputs'])
         return 0
@@ -171,7 +200,7 @@ class ArmBalance:
     def _present(self):
         """Interval on the grid, and share of it, of the present angle."""
         theta = self._theta
-        k = min(max(bisect.bisect_right(theta, self._angle), 1), len(theta) - 1)
+        k = bisect.bisect_right(theta, self._angle, 1, len(theta) - 1)
         return k, (self._angle - theta[k - 1]) / (theta[k] - theta[k - 1])
 
     def _required(self, line, k, share, dt):
@@ -179,51 +208,47 @@ class ArmBalance:
         load = line.load[k - 1] + share * (line.load[k] - line.load[k - 1])
         if dt:
             theta = self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
-            speed = (theta - self._angle) / dt
-            moment = self.viscous * speed + self.inertia * (speed - self._velocity) / dt
+            speed, acceleration = self._moved(theta, dt)
+            moment = self.viscous * speed + self.inertia * acceleration
             load -= moment * (line.resist[k - 1] + share * (line.resist[k] - line.resist[k - 1]))
         return load
 
-    def _solve(self, line, x, offset, factor, dt):
+    def _moved(self, theta, dt):
+        """Return velocity and acceleration where the arm gets to `theta` within `dt`."""
+        if self._before is not None and self._before[0] == dt:
+            # Two steps alike: of second order, so that what rings goes on ringing.
+            _, angle, velocity = self._before
+            speed = (1.5 * theta - 2.0 * self._angle + 0.5 * angle) / dt
+            return speed, (1.5 * speed - 2.0 * self._velocity + 0.5 * velocity) / dt
+        speed = (theta - self._angle) / dt
+        return speed, (speed - self._velocity) / dt
+
+    def _keep_motion(self, angle, dt):
+        """Note the velocity with which the arm gets to `angle`; none at an end or at rest."""
+        if not dt or angle in (self._theta[0], self._theta[-1]):
+            self._velocity, self._before = 0.0, None
+            return
+        velocity, _ = self._moved(angle, dt)
+        self._before = dt, self._angle, self._velocity
+        self._velocity = velocity
+
+    def _solve(self, line, x, offset, factor):
         """Commit the u next to the present one with load(theta(H2[u])) - x - u = 0."""
         operator, base = self.operators[0], self.base
-        peek, place, required = operator.peek, line.place, self._required
+        peek, place, load = operator.peek, line.place, line.load
 
         def residual(u):
-            return required(line, *place(factor * (peek(u) - base), offset), dt) - x - u
+            k, share = place(factor * (peek(u) - base), offset)
+            return load[k - 1] + share * (load[k] - load[k - 1]) - x - u
 
         u = operator.input
         here = residual(u)
         if abs(here) > self.tolerance:
-            operator.step(self._root(residual, u, here))
+            points = bracket(residual, u, here, here * self._gain)
+            found = illinois(residual, *points, self.tolerance)
+            self._gain = min(max((found - u) / here, 0.5), 10.0)
+            operator.step(found)
         return factor * (operator.output - base)
-
-    def _root(self, residual, u, here):
-        # The residual falls with u: go the way of its sign until it changes.
-        first, initial = u, here
-        step = here * self._gain
-        far = u + step
-        there = residual(far)
-        for _ in range(MOST_ITERATIONS):
-            if there * here <= 0.0:
-                break
-            u, here = far, there
-            step *= 2.0
-            far = u + step
-            there = residual(far)
-        # Illinois: false position that cannot stall at one end.
-        for _ in range(MOST_ITERATIONS):
-            if abs(there) <= self.tolerance or there == here:
-                break
-            middle = far - there * (far - u) / (there - here)
-            value = residual(middle)
-            if value * there < 0.0:
-                u, here = far, there
-            else:
-                here *= 0.5
-            far, there = middle, value
-        self._gain = min(max((far - first) / initial, 0.5), 10.0)
-        return far
 
     def _solve_bundle(self, line, x, offset, factor, dt):
         """Commit the elongation in which muscles of unequal length balance the arm."""
@@ -266,21 +291,28 @@ class _Line:
         self.load = load.tolist()
         self.resist = (weight / leverage).tolist()
         self.strain = None if np.all(scale == 1.0) else (1.0 / scale).tolist()
+        self._near = 1
 
     def place(self, demand, offset):
         """Return interval on the grid, and share of it, for what the transformation gives."""
-        grid, strain = self.demand, self.strain
+        grid, strain, last = self.demand, self.strain, len(self.demand) - 1
         if strain is None or offset == 0.0:
             demand += offset
-            k = min(max(bisect.bisect_right(grid, demand), 1), len(grid) - 1)
+            k = bisect.bisect_right(grid, demand, 1, last)
             below, above = grid[k - 1], grid[k]
         else:
-            # The offset is not part of the strain that the load scales.
-            k = bisect.bisect_right(range(len(grid)), demand,
-                                    key=lambda row: grid[row] - offset * strain[row])
-            k = min(max(k, 1), len(grid) - 1)
+            # The offset is not part of the strain that the load scales; it is small, so the
+            # place is near the one without it.
+            k = bisect.bisect_right(grid, demand + offset * strain[self._near], 1, last)
             below = grid[k - 1] - offset * strain[k - 1]
             above = grid[k] - offset * strain[k]
+            while demand >= above and k < last:
+                k += 1
+                below, above = above, grid[k] - offset * strain[k]
+            while demand < below and k > 1:
+                k -= 1
+                below, above = grid[k - 1] - offset * strain[k - 1], below
+            self._near = k
         if demand <= below:
             return k, 0.0
         return k, 1.0 if demand >= above else (demand - below) / (above - below)

@@ -7,10 +7,14 @@ import math
 
 from scipy import optimize
 
+from hysteresis_ros.bicep.root import bracket
+
 # Force per elongation [N/m] of a wire that is wholly in one phase.
 ELASTICITY = 5e3
-# First step [m] of the search for the balance.
-FIRST_STEP = 1e-4
+# First step [m] of the search for the balance, at least; how exactly it is found [m].
+FIRST_STEP, EXACT = 1e-5, 1e-11
+# About how far the muscles go for a load that is missing [m/N].
+USUAL_GAIN = 1e-3
 
 
 class Bundle:
@@ -81,14 +85,14 @@ class Bundle:
             return load(output) - self.share(self.inputs(output), x)
 
         near = min(max(near, low), high)
-        towards = math.copysign(FIRST_STEP, lacking(near))
-        while low < near + towards < high and lacking(near + towards) * towards > 0.0:
-            near += towards
-            towards *= 2.0
-        far = min(max(near + towards, low), high)
-        if lacking(far) * towards >= 0.0:
-            return far
-        return optimize.brentq(lacking, near, far, xtol=1e-12, rtol=1e-14)
+        here = lacking(near)
+        if here == 0.0:
+            return near
+        step = math.copysign(max(abs(here) * USUAL_GAIN, FIRST_STEP), here)
+        near, here, far, there = bracket(lacking, near, here, step, low, high)
+        if here * there < 0.0:
+            far = optimize.brentq(lacking, near, far, xtol=EXACT, rtol=1e-14)
+        return far
 
     def step(self, inputs) -> None:
         """Commit each muscle's input."""

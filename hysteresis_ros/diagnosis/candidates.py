@@ -64,7 +64,10 @@ def possible(problem, known) -> tuple[list[str], dict[str, str]]:
         Identifiers to try; identifiers that are left out with the reason.
     """
     surroundings = problem.model.surroundings
-    taken = {effect.id for effect in [*problem.model.effects, *known]}
+    taken = {effect.id for effect in known} | {
+        effect.id for effect in problem.model.effects if not may_differ(problem, effect)}
+    # What one that is known already contains is not tried beside it.
+    taken |= {name for effect in known for name in effect.replaces}
     names, hopeless = [], {}
     for name, effect in catalogue().items():
         if name in taken or problem.kind not in effect.kinds:
@@ -81,6 +84,17 @@ def possible(problem, known) -> tuple[list[str], dict[str, str]]:
         else:
             names.append(name)
     return names, hopeless
+
+
+def present(model, kind):
+    """Return the model's own effect of a kind, or a neutral one."""
+    own = [effect for effect in model.effects if effect.id == kind.id]
+    return own[0] if own else kind(model.surroundings)
+
+
+def may_differ(problem, effect) -> bool:
+    """Whether an effect of the model may be another one here than on the bench that showed it."""
+    return problem.kind == 'arm' and 'bench' in effect.kinds
 
 
 def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
@@ -106,7 +120,7 @@ def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
     problem = fitter.problem
     kind = catalogue()[name]
     beside = [effect for effect in known if effect.id not in kind.replaces]
-    effect = kind(problem.model.surroundings)
+    effect = present(problem.model, kind)
     with np.errstate(all='ignore'):
         fit = fitter.search(problem.model.effects, beside, effect)
         fit = fitter.cross_validate(problem.model.effects, fit)

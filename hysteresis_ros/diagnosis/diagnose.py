@@ -14,8 +14,8 @@ import numpy as np
 
 from hysteresis_ros.diagnosis import leftover, significance, structure
 from hysteresis_ros.diagnosis.candidates import (
-    Candidate, consider_all, consider_sets, possible)
-from hysteresis_ros.diagnosis.fit import Fitter
+    Candidate, consider_all, consider_sets, possible, present)
+from hysteresis_ros.diagnosis.fit import Fitter, beside
 from hysteresis_ros.diagnosis.problem import problem_for
 from hysteresis_ros.effects import catalogue
 
@@ -29,12 +29,18 @@ MOST_EFFECTS = 3
 MOST_SEEDS = 3
 # Effects of which all sets are tried on the bench.
 MOST_IN_SETS = 5
+# Effects of which all pairs are tried on the arm.
+MOST_IN_PAIRS = 5
 # Effects whose signatures agree more than this cannot be told apart.
 CONFUSED = 0.9
 # The base model's error on the arm may be this many times that of the bench's verification.
 STRUCTURE_MARGIN = 1.6
 # More than this share of the first mean square left over means that the cause is not known.
-UNEXPLAINED = 0.3
+UNEXPLAINED = {'arm': 0.08, 'bench': 0.3}
+# Share of the residual's mean square that one event has to explain to count as the cause.
+EVENT_SHARE = 0.5
+# A drive that moves over less than this share of its range excites nothing.
+LEAST_DRIVE = 0.05
 MOST_ALTERNATIVES = 3
 # Rivals that are fitted again when a set of effects is checked.
 RIVALS = 6
@@ -129,6 +135,13 @@ def diagnose(model, measurements, jobs: int = 1, seed: int = 0, progress=_silent
     return _Diagnostician(problem_for(model, measurements), jobs, seed, progress).run()
 
 
+def _simplest(candidates) -> list:
+    """Return the one with fewest parameters of those nearly as good as the first; [] if none."""
+    enough = [candidate for candidate in candidates
+              if candidate.rmse <= (1.0 + PRACTICAL) * candidates[0].rmse]
+    return sorted(enough, key=lambda candidate: len(candidate.fit.vector))[:1]
+
+
 class _Diagnostician:
     """The procedure with its state: what was found, and the fit with it."""
 
@@ -165,13 +178,13 @@ class _Diagnostician:
         else:
             sets = [self._grow(seed, first) for seed in self._seeds(first)]
             sets = [found for found in sets if found is not None]
+            sets += self._pairs(first, sets)
         if sets:
             best = min(self.fitter.error(fit.held_out) for fit in sets)
             enough = [fit for fit in sets
                       if self.fitter.error(fit.held_out) <= (1.0 + PRACTICAL) * best]
-            fewest = min(len(fit.effects) for fit in enough)
-            self.current = min((fit for fit in enough if len(fit.effects) == fewest),
-                               key=lambda fit: self.fitter.error(fit.held_out))
+            self.current = min(enough, key=lambda fit: (
+                len(fit.effects), len(fit.vector), self.fitter.error(fit.held_out)))
             self.known = self.current.effects
             if not problem.refits:
                 self._drop()
@@ -182,7 +195,7 @@ class _Diagnostician:
         significant = [candidate for candidate in first
                        if self._significant(candidate, self.current)]
         plausible = [candidate for candidate in significant if not candidate.implausible]
-        seeds = plausible[:1]
+        seeds = _simplest(plausible)
         limit = (1.0 - PRACTICAL) * plausible[0].rmse if plausible else np.inf
         better = [candidate for candidate in significant
                   if candidate.implausible and candidate.rmse < limit]
@@ -212,17 +225,41 @@ class _Diagnostician:
         while (len(fit.effects) < MOST_EFFECTS
                and self.fitter.error(fit.held_out) > STRUCTURE_MARGIN * self.floor):
             known = fit.effects
-            taken = {effect.id for effect in known}
-            names = [name for name in self._worth_another_look(first, fit) if name not in taken]
+            possibly, _ = possible(self.problem, known)
+            names = [name for name in self._worth_another_look(first, fit) if name in possibly]
             rivals = consider_all(self.fitter, known, fit, names, self.jobs, self.progress)
             self._test(rivals, fit)
             rivals = [rival for rival in rivals if self._significant(rival, fit)]
             plausible = [rival for rival in rivals if not rival.fit.implausible()]
-            chosen = (plausible or (rivals if fit.implausible() else []))[:1]
+            chosen = _simplest(plausible or (rivals if fit.implausible() else []))
             if not chosen:
                 break
             fit = chosen[0].fit
         return None if fit.implausible() else fit
+
+    def _pairs(self, first, grown):
+        """
+        Pairs of the leading effects that explain more than what was grown from single ones.
+
+        One effect can mask another: the best by itself may stand in for two that are not.
+        """
+        if not grown or all(len(fit.effects) == 1 and self.fitter.error(fit.held_out)
+                            <= STRUCTURE_MARGIN * self.floor for fit in grown):
+            return []
+        leading = [candidate.effect for candidate in first
+                   if self._significant(candidate, self.current)][:MOST_IN_PAIRS]
+        pairs = [fit for fit in consider_sets(self.fitter, leading, 2, self.jobs, self.progress)
+                 if len(fit.effects) == 2 and not fit.implausible()]
+        singles = [fit for fit in grown if len(fit.effects) == 1]
+        best = min(singles, key=lambda fit: self.fitter.error(fit.held_out), default=None)
+        if best is None or not pairs:
+            return pairs
+        error = self.fitter.error(best.held_out)
+        gains = np.array([error ** 2 - self.fitter.error(fit.held_out) ** 2 for fit in pairs])
+        chance = np.stack([self._chance(fit.jacobian, best.jacobian, self.decoys)
+                           for fit in pairs])
+        values = significance.family_p_values(gains, chance)
+        return [fit for fit, value in zip(pairs, values) if value <= SIGNIFICANCE]
 
     def _draw_structure(self):
         problem = self.problem
@@ -269,17 +306,17 @@ class _Diagnostician:
             values = np.zeros(len(candidates))
             for draws in (self.decoys, significance.flipped(error, problem.block, self.rng)):
                 chance = np.stack([
-                    self._chance(candidate, current, draws) for candidate in candidates])
+                    self._chance(candidate.fit.jacobian, current.jacobian, draws)
+                    for candidate in candidates])
                 values = np.maximum(values, significance.family_p_values(gains, chance))
         for candidate, value in zip(candidates, values):
             candidate.p_value = float(value)
 
-    def _chance(self, candidate, current, draws):
-        """Gain of the candidate in draws without an effect, shape (m,)."""
+    def _chance(self, with_it, without, draws):
+        """Gain of a Jacobian over another in draws without an effect, shape (m,)."""
         fold = self.problem.fold
-        before = significance.held_out_errors(current.jacobian, draws, fold)
-        after = significance.held_out_errors(candidate.fit.jacobian, draws, fold)
-        return before - after
+        return (significance.held_out_errors(without, draws, fold)
+                - significance.held_out_errors(with_it, draws, fold))
 
     def _significant(self, candidate, current) -> bool:
         before, after = self.fitter.error(current.held_out), candidate.rmse
@@ -349,24 +386,33 @@ class _Diagnostician:
         problem = self.problem
         after = self.fitter.error(self.current.held_out)
         residual = problem.measured - self.current.held_out
-        left = leftover.examine(problem, residual)
+        sensitivity = None if problem.refits else structure.sensitivity(problem, self.fixed)
+        left = leftover.examine(problem, residual, sensitivity)
         limit = self._limit()
         excess = max(after ** 2 - limit ** 2, 0.0) if after > limit else 0.0
         unexplained = excess / max(self.before ** 2, 1e-300)
         if problem.refits:
             unexplained = left.explained * (after / self.before) ** 2
-        named = bool(self.known)
+        # Something that happened once explains what no steady effect can.
+        event, share = leftover.event_of(
+            problem, problem.measured - self.base.held_out, sensitivity)
+        happened = (share > EVENT_SHARE and self.before > limit
+                    and np.sqrt(1.0 - share) * self.before < (1.0 - PRACTICAL) * after)
+        if not happened:
+            event = left.event if left.event_share > EVENT_SHARE else None
         hidden = self._hidden(first, hopeless, limit)
-        if unexplained > UNEXPLAINED:
+        if unexplained > UNEXPLAINED[problem.kind] or happened:
+            # What explains a part of it stands in the ranking; the cause is none of these.
             verdict = 'unknown'
-        elif named:
+            self.known, self.current, after = [], self.base, self.before
+        elif self.known:
             verdict = 'missing'
-        elif not problem.refits and hidden and len(hidden) > 0.8 * max(len(first), 1):
+        elif self._still() or (not problem.refits and len(hidden) > 0.8 * max(len(first), 1)):
             verdict = 'not_excited'
         else:
             verdict = 'adequate'
-        alternatives = self._alternatives(first) if named else []
-        effects = self.fitter.with_intervals(self.current) if named else []
+        alternatives = self._alternatives(first)
+        effects = self.fitter.with_intervals(self.current)
         missing = [effect.id for effect in effects]
         return Diagnosis(
             verdict=verdict, missing=missing, alternatives=alternatives,
@@ -375,8 +421,13 @@ class _Diagnostician:
             experiment=self._experiment(verdict, missing, alternatives, {**hopeless, **hidden}),
             effects=effects, rmse_before=self.before, rmse_after=after,
             not_excited={**hopeless, **hidden},
-            event=left.event if left.event_share > 0.5 and verdict == 'unknown' else None,
+            event=event if verdict == 'unknown' else None,
             signal=left.signal if verdict == 'unknown' else '')
+
+    def _still(self) -> bool:
+        """Whether the drive hardly moved."""
+        drive = self.problem.signals.get('drive', np.zeros(1))
+        return bool(np.ptp(drive) < LEAST_DRIVE * self.problem.model.drive_range)
 
     def _limit(self) -> float:
         """Largest error that base model and sensor may leave by themselves."""
@@ -388,13 +439,14 @@ class _Diagnostician:
         """Effects that even at the upper end of their range would not stand out here."""
         hidden = {}
         for candidate in first:
-            strongest = catalogue()[candidate.id](self.problem.model.surroundings)
+            strongest = present(self.problem.model, catalogue()[candidate.id])
             strongest = strongest.with_values(**{
                 parameter.name: (parameter.choices[-1] if parameter.choices else parameter.high)
                 for parameter in strongest.parameters if self.problem.kind in parameter.kinds})
             if self.problem.refits:
                 continue
-            changed = self.problem.simulate([*self.fixed, strongest]) - self.base.predicted
+            changed = self.problem.simulate(
+                [*beside(self.fixed, [strongest]), strongest]) - self.base.predicted
             size = float(np.sqrt(np.mean(changed ** 2)))
             if np.isfinite(size) and size < 0.3 * limit:
                 hidden[candidate.id] = 'even a strong one would change less than the noise'

@@ -7,6 +7,7 @@ import hashlib
 
 import numpy as np
 
+from hysteresis_ros.diagnosis.candidates import may_differ, present
 from hysteresis_ros.diagnosis.fit import Fitter
 from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.diagnosis.problem import problem_for
@@ -73,7 +74,8 @@ def extend(model, names, train, test=()) -> Extension:
     ----------
     model : MuscleModel
     names : sequence of str
-        Effects of the catalogue, in the order in which they are added.
+        Effects of the catalogue, in the order in which they are added. An effect of the wire that
+        the bench has shown is fitted anew to the wires of the arm.
     train : sequence of Measurement
         Recordings to fit.
     test : sequence of Measurement
@@ -87,23 +89,24 @@ def extend(model, names, train, test=()) -> Extension:
     ------
     ParameterError
         If an effect is unknown, named twice, already there, or cannot show in this kind of data.
+        One of the wire that the bench has shown is there may be fitted anew to an arm.
     MeasurementError
         If the recordings do not fit together.
     """
-    classes = _checked(model, names)
     problem = problem_for(model, train)
+    classes = _checked(problem, names)
     fitter = Fitter(problem)
     for kind in classes:
         if problem.kind not in kind.kinds:
             raise ParameterError(f'effect {kind.id} cannot be fitted to a {problem.kind} '
                                  'measurement; give an arm run')
-    replaced = {name for kind in classes for name in kind.replaces}
+    replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
     base = model.with_effects([e for e in model.effects if e.id not in replaced])
     judged = list(test) or list(train)
     models, known = [('base', model)], []
     for kind in classes:
         known = [effect for effect in known if effect.id not in kind.replaces]
-        fit = _best(fitter, base.effects, known, kind(model.surroundings))
+        fit = _best(fitter, base.effects, known, present(model, kind))
         known = fit.effects
         models.append((f'+ {kind.id}', problem.completed([*base.effects, *known])))
     fit = fitter.fit(base.effects, known, evaluations=EVALUATIONS)
@@ -122,13 +125,13 @@ def extend(model, names, train, test=()) -> Extension:
                      fit.implausible())
 
 
-def _checked(model, names):
+def _checked(problem, names):
     names = list(names)
-    present = {effect.id for effect in model.effects}
+    fixed = {e.id for e in problem.model.effects if not may_differ(problem, e)}
     for name in names:
         if names.count(name) > 1:
             raise ParameterError(f'effect {name} is named twice')
-        if name in present:
+        if name in fixed:
             raise ParameterError(f'the model already has the effect {name}')
     if not names:
         raise ParameterError('no effect is named; `hysteresis effects` lists them')

@@ -11,8 +11,9 @@ from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 
 # Simulated responses are smooth only on this scale of the parameters' units.
 DIFFERENCE = 0.02
-# Starts that are followed to the end after all were tried once.
+# Starts that are followed for a few steps after all were tried once; the best goes on.
 FOLLOWED_STARTS = 2
+FIRST_EVALUATIONS = 4
 MOST_EVALUATIONS = 8
 HELD_OUT_EVALUATIONS = 3
 
@@ -34,6 +35,8 @@ class Fit:
         Derivatives of `predicted`.
     held_out : ndarray, shape (n,)
         Response of every row as predicted by a fit to the other folds; see `cross_validate`.
+    converged : bool
+        Whether the fit ended by itself.
     """
 
     effects: list
@@ -41,12 +44,23 @@ class Fit:
     predicted: np.ndarray
     jacobian: np.ndarray
     held_out: np.ndarray | None = None
+    converged: bool = True
 
     def implausible(self) -> list:
         """Names of parameters outside their physical range or at the end of the widened one."""
         names = [f'{effect.id}.{name}' for effect in self.effects
                  for name in effect.implausible()]
         return names
+
+
+def beside(fixed, effects) -> list:
+    """
+    Return the fixed effects of a model that stay beside fitted ones.
+
+    An effect of the wire that the bench has shown may be fitted anew to the wires of an arm.
+    """
+    fitted = {effect.id for effect in effects}
+    return [effect for effect in fixed if effect.id not in fitted]
 
 
 class Fitter:
@@ -63,7 +77,7 @@ class Fitter:
         self.problem = problem
 
     def _respond(self, fixed, parameters, train):
-        kept = [effect for effect in fixed]
+        kept = beside(fixed, parameters.effects)
 
         def respond(vector):
             return self.problem.simulate(kept + parameters.with_vector(vector), train)
@@ -76,7 +90,7 @@ class Fitter:
         Parameters
         ----------
         fixed : sequence of Effect
-            Effects of the model that are not fitted.
+            Effects of the model; those that are among the fitted ones are left out.
         effects : sequence of Effect
             Effects to fit; their values are the start.
         rows : ndarray of bool, shape (n,), optional
@@ -122,8 +136,11 @@ class Fitter:
             lambda vector: (full(vector)[rows] - measured) / scale, start,
             jac=lambda vector: jacobian(vector)[rows] / scale,
             bounds=(parameters.lower, parameters.upper), method='trf', x_scale=1.0,
-            xtol=1e-4, ftol=1e-5, gtol=1e-8, max_nfev=evaluations)
-        return Fit(parameters.with_vector(found.x), found.x, full(found.x), jacobian(found.x))
+            xtol=1e-3, ftol=1e-4, gtol=1e-8, max_nfev=evaluations)
+        # The optimiser has the derivatives of the rows it was given.
+        derivatives = found.jac * scale if np.all(rows) else jacobian(found.x)
+        return Fit(parameters.with_vector(found.x), found.x, full(found.x), derivatives,
+                   converged=found.status > 0)
 
     def search(self, fixed, known, effect, rows=None) -> Fit:
         """
@@ -136,18 +153,26 @@ class Fitter:
         known : sequence of Effect
             Effects found before, fitted again beside the new one.
         effect : Effect
-            The new one; its values are not looked at.
+            The new one; its values count only if it takes the place of a fixed one.
         """
         mask = slice(None) if rows is None else rows
         measured = self.problem.measured[mask]
 
+        kept = beside(fixed, [*known, effect])
+
         def error(candidate):
-            predicted = self.problem.simulate([*fixed, *known, candidate], rows)
+            predicted = self.problem.simulate([*kept, *known, candidate], rows)
             return float(np.mean((predicted[mask] - measured) ** 2))
 
-        starts = sorted(starts_of(effect, self.problem.kind), key=error)
-        fits = [self.fit(fixed, [*known, start], rows) for start in starts[:FOLLOWED_STARTS]]
-        return min(fits, key=lambda fit: self.error(fit.predicted, mask))
+        starts = starts_of(effect, self.problem.kind)
+        if len(kept) < len(fixed):
+            # What the bench says of it is as good a start as any.
+            starts.append(effect)
+        starts.sort(key=error)
+        fits = [self.fit(fixed, [*known, start], rows, FIRST_EVALUATIONS)
+                for start in starts[:FOLLOWED_STARTS]]
+        best = min(fits, key=lambda fit: self.error(fit.predicted, mask))
+        return best if best.converged else self.fit(fixed, best.effects, rows)
 
     def error(self, predicted, rows=slice(None)) -> float:
         """Root mean square error of some rows."""
@@ -178,7 +203,8 @@ class Fitter:
                     jacobian.T @ jacobian + ridge * np.eye(len(vector)), jacobian.T @ error)
                 vector = np.clip(vector + np.clip(step, -1.0, 1.0), parameters.lower,
                                  parameters.upper)
-            predicted = problem.simulate([*fixed, *parameters.with_vector(vector)])
+            predicted = problem.simulate(
+                [*beside(fixed, fit.effects), *parameters.with_vector(vector)])
             held_out[test] = predicted[test]
         return dataclasses.replace(fit, held_out=held_out)
 

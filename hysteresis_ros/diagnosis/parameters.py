@@ -83,7 +83,7 @@ def _from_unit(parameter, value: float) -> float:
     return math.exp(value) if parameter.log else value * _unit(parameter)
 
 
-def starts_of(effect, kind: str, most: int = 9) -> list:
+def starts_of(effect, kind: str, most: int = 14) -> list:
     """
     Return copies of `effect` at the values from which a fit may start.
 

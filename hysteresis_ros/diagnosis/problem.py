@@ -23,7 +23,7 @@ from hysteresis_ros.operators import Preisach, cell_areas
 
 # A long recording is judged on about this many rows; between them nothing new is learned. Weights
 # that are refitted again and again ask for fewer.
-MOST_ROWS = {'arm': 1500, 'bench': 400}
+MOST_ROWS = {'arm': 1000, 'bench': 400}
 MOST_FOLDS = 4
 # Blocks for significance: about this many a recording.
 BLOCKS = 24
@@ -146,12 +146,7 @@ class ArmProblem(Problem):
         train : ndarray of bool, shape (n,), optional
             Not used: nothing but the effects' own parameters is fitted here.
         """
-        dense = self.settled or any(effect.needs_every_row for effect in effects)
-        columns = []
-        for simulator in self.simulators:
-            simulator.stride = 1 if dense else self.stride
-            columns.append(simulator.run(effects))
-        return self.pick(columns)
+        return self.pick([simulator.run(effects) for simulator in self.simulators])
 
     def completed(self, effects):
         """Return the model with these effects."""
@@ -165,10 +160,9 @@ class ArmProblem(Problem):
         step = 0.01 * self.model.surroundings.span
         columns = []
         for simulator, rows in zip(self.simulators, self.chosen):
-            simulator.stride = 1 if self.settled else self.stride
             inputs: list[np.ndarray] = []
             base = simulator.run(effects, inputs)
-            moved = simulator.run([*effects, Offset(step)])
+            moved = simulator.run([*effects, Offset(size=step)])
             areas = np.concatenate([
                 np.apply_along_axis(lambda column: np.interp(
                     np.arange(count), chosen, column), 0, preisach_rows(stage.nodes, u, True))

@@ -11,27 +11,26 @@ tell how much of the residual any effect may explain by chance.
 
 import numpy as np
 
-from hysteresis_ros.effects import MaterialEffect
+from hysteresis_ros.effects import MaterialEffect, Parameter
 
 DECOYS = 200
 # Waves that make up one random field, and the length over which it changes, as a share of the
 # range of each signal.
 WAVES = 12
 CORRELATION = 0.45
+# Spread of the decoys' size, as a logarithm.
+SIZE_SPREAD = 0.2
 
 
 class Offset(MaterialEffect):
     """A constant added to the elongation, to see what an error of the length does to the angle."""
 
     id = 'offset'
-
-    def __init__(self, size: float):
-        super().__init__()
-        self._size = size
+    parameters = (Parameter('size', 'm', 'what is added', 0.0, 1.0, 0.0, ()),)
 
     def drift(self, drive, heat, inputs, surroundings):
         """Return the offset."""
-        return np.full(len(drive), self._size), np.ones(len(drive))
+        return np.full(len(drive), self.size), np.ones(len(drive))
 
 
 def length_error(model) -> float:
@@ -51,8 +50,8 @@ def length_error(model) -> float:
 def sensitivity(problem, effects) -> np.ndarray:
     """Return how the angle follows an error of the length [rad/m], shape (n,)."""
     step = 0.01 * problem.model.surroundings.span
-    up = problem.simulate([*effects, Offset(step)])
-    down = problem.simulate([*effects, Offset(-step)])
+    up = problem.simulate([*effects, Offset(size=step)])
+    down = problem.simulate([*effects, Offset(size=-step)])
     return (up - down) / (2.0 * step)
 
 
@@ -87,8 +86,12 @@ def decoys(problem, effects, predicted, rng, count: int = DECOYS) -> np.ndarray:
     for draw in range(count):
         common, own = (_field(coordinates, rng) for _ in range(2))
         fields[draw] = common + 0.5 * np.where(direction > 0.0, own, -own)
-    fields *= size / np.sqrt(1.25)
-    return fields * gain + problem.noise * rng.standard_normal(fields.shape)
+    fields *= gain
+    # The bench says how large the error is, so that only its form is left to chance, and a little
+    # of its size, because the arm goes other ways than the bench.
+    wanted = size * np.sqrt(np.mean(gain ** 2)) * np.exp(SIZE_SPREAD * rng.standard_normal(count))
+    fields *= (wanted / np.maximum(np.sqrt(np.mean(fields ** 2, axis=1)), 1e-300))[:, None]
+    return fields + problem.noise * rng.standard_normal(fields.shape)
 
 
 def _unit(values):

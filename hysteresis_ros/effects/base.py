@@ -162,12 +162,12 @@ class Effect(abc.ABC):
     kinds: ClassVar[tuple] = ('arm',)
     # Whether only a recording with transients can show it.
     needs_transients: ClassVar[bool] = False
-    # Whether a simulation that leaves rows out would not show it.
-    needs_every_row: ClassVar[bool] = False
     # Whether the maps need the martensite share, which a first pass without them gives.
     needs_phase: ClassVar[bool] = False
     # A recorded column without which the effect cannot be told.
     needs_column: ClassVar[str | None] = None
+    # Whether every muscle under load has it, so that nobody has to prove that it is there.
+    universal: ClassVar[bool] = False
     # Whether a controller undoes it.
     invertible: ClassVar[bool] = True
     # Names of the attributes that hold what it remembers of the past; `start` sets them.

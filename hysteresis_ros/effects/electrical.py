@@ -86,8 +86,8 @@ class ResistanceChange(ElectricalEffect):
     id = 'resistance_change'
     sentence = ("The wire's resistance changes as it transforms, so the same voltage heats the "
                 'two phases differently.')
-    equation = ('heat = V^2 (1 + eta) / (1 + eta xi), xi the martensite share: V^2 / R with '
-                'R = R_A (1 + eta xi), the cold wire as on the bench; the inverse for a current')
+    equation = ('heat = V^2 / (1 + eta xi), xi the martensite share: V^2 / R with '
+                'R = R_A (1 + eta xi), the hot wire as on the bench; the inverse for a current')
     source = "the paper's reference [46]: less than 15 % in phase transition"
     shows_in = 'the middle of the loop'
     experiment = 'log the current as well as the voltage'
@@ -106,6 +106,5 @@ class ResistanceChange(ElectricalEffect):
         return signal / float(self._gain(inputs, surroundings))
 
     def _gain(self, inputs, surroundings):
-        cold = max(1.0 + self.eta, 0.1)
-        gain = np.sqrt(cold / np.maximum(1.0 + self.eta * inputs.phase, 0.1))
+        gain = 1.0 / np.sqrt(np.maximum(1.0 + self.eta * inputs.phase, 0.1))
         return gain if surroundings.drive == 'voltage' else 1.0 / gain

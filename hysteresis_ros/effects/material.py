@@ -21,12 +21,13 @@ class StressDependence(MaterialEffect):
     id = 'stress_dependence'
     sentence = 'Load shifts the transformation to higher temperatures (Clausius-Clapeyron).'
     equation = ('T -> T - sigma / C: H2[F - C T], where V^2 stands for T in a heated wire; '
-                'on the arm alone: F -> F + shift (F - Fm)')
+                'on the arm alone: F -> F + shift (F - Fp), Fp = 0 where C is known, else Fm')
     source = 'Clausius-Clapeyron relation of shape memory alloys; Eq. 2 of the paper'
     shows_in = 'load at the same drive'
     experiment = 'the same loop under three or more loads'
     confused_with = ('supply_sag', 'series_compliance')
     kinds = ('arm', 'bench')
+    universal = True
     SHIFT = Parameter('shift', '1', 'influence of the load against that in the bench model, less '
                       'one', 0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',))
     # Load per heat: of a 0.2 mm wire 5 to 15 MPa/K at 2 to 12 K/V^2, of any other drive unknown.
@@ -55,8 +56,11 @@ class StressDependence(MaterialEffect):
         return self.C * self.PREFIX.get(self.parameters[0].unit, 1.0)
 
     def shift_load(self, load, surroundings):
-        """Weigh the deviation from the bench's mean load more or less."""
-        return self.shift * (load - surroundings.load)
+        """Weigh the load more or less than the bench model does."""
+        # Where C is known, another one leaves the unloaded muscle as it is; weights that were
+        # fitted without it are right at the bench's mean load.
+        pivot = 0.0 if self.C else surroundings.load
+        return self.shift * (load - pivot)
 
     @classmethod
     def available(cls, surroundings):
@@ -69,24 +73,32 @@ class StressDependentStrain(MaterialEffect):
 
     id = 'stress_dependent_strain'
     sentence = 'The transformation strain grows with the load and saturates.'
-    equation = "S(F) = (1 - r exp(-F / F0)) / (1 - r exp(-Fm / F0)), Fm the bench's mean load"
+    equation = ("S(F) = (1 - r exp(-F / F0)) / (1 - r exp(-Fm / F0)), Fm the bench's mean load; on "
+                'the arm alone: + growth (1 - exp(-F / F0)) above the line, from no load where r '
+                'is known, else from Fm')
     source = 'orientation of martensite variants under stress'
     shows_in = 'load, cold side'
     experiment = 'the same loop under three or more loads'
     confused_with = ('series_compliance',)
     kinds = ('arm', 'bench')
+    universal = True
     parameters = (
         Parameter('r', '1', 'share of the strain that is missing without load', 0.02, 1.0, 0.0,
-                  (0.3, 0.8), limits=(0.0, 1.0)),
+                  (0.3, 0.8), limits=(0.0, 1.0), kinds=('bench',)),
         Parameter('F0', 'loads', "load scale of the saturation over the bench's mean load",
-                  0.1, 3.0, 1.0, (0.5, 1.5), log=True),)
+                  0.1, 3.0, 1.0, (0.5, 1.5), log=True, kinds=('bench',)),
+        Parameter('growth', '1', 'growth of the strain with the load against that on the bench',
+                  0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',)),)
 
     def scale(self, load, surroundings):
         """Grow with the load, one at the bench's mean load."""
-        scale = self.F0 * surroundings.load
-        share = 1.0 - self.r * np.exp(-np.maximum(load, 0.0) / scale)
+        left = np.exp(-np.maximum(load, 0.0) / (self.F0 * surroundings.load))
+        at_mean = math.exp(-1.0 / self.F0)
+        # As for the shift of `stress_dependence`.
+        pivot = 1.0 if self.r else at_mean
+        share = 1.0 - self.r * left + self.growth * (pivot - left)
         # A stroke of nothing could not be inverted.
-        return np.maximum(share, 0.02) / max(1.0 - self.r * math.exp(-1.0 / self.F0), 0.02)
+        return np.maximum(share, 0.02) / max(1.0 - self.r * at_mean, 0.02)
 
     @classmethod
     def available(cls, surroundings):
@@ -105,10 +117,12 @@ class SeriesCompliance(MaterialEffect):
     experiment = 'hang weights on the cold muscle'
     confused_with = ('payload_error', 'geometry_error')
     kinds = ('arm', 'bench')
+    universal = True
     parameters = (
-        Parameter('compliance', 'mm/N', 'elongation per load', 0.005, 0.5, 0.0, (0.02, 0.1),
+        Parameter('compliance', 'mm/N', 'elongation per load', 0.005, 0.65, 0.0, (0.02, 0.1),
                   log=True),)
 
+    # Crimps and cable of 2 kN/m and more, and the wire itself with about 0.15 mm/N.
     UNITS = {'mm/N': 1e-3, '1/GPa': 1e-9, '%/N': 1e-2, 'mm/MPa': 1e-9}
     # The same wire of 0.27 m and 0.2 mm in the units of other tables.
     RANGES = {('strain', 'stress'): ('1/GPa', 'strain per stress', 0.004, 0.3),
@@ -128,9 +142,8 @@ class SeriesCompliance(MaterialEffect):
         return (Parameter('compliance', unit, meaning, low, high, 0.0, starts, log=True),)
 
     def stretch(self, load, surroundings):
-        """Return the elastic elongation beyond that at the bench's mean load."""
-        compliance = self.compliance * self.UNITS[self.parameters[0].unit]
-        return compliance * (load - surroundings.load)
+        """Return the elastic elongation."""
+        return self.compliance * self.UNITS[self.parameters[0].unit] * load
 
     @classmethod
     def available(cls, surroundings):
@@ -191,49 +204,49 @@ class Creep(MaterialEffect):
 
     id = 'creep'
     sentence = 'After a step the muscle goes on moving the same way, with the logarithm of time.'
-    equation = 'L += -+ c l0 ln(1 + t / t0) since the last step'
-    source = 'logarithmic creep'
+    equation = ('L += c l0 dxi ln(1 + t / t0) since the last step, dxi the change of the '
+                'martensite share by that step')
+    source = 'logarithmic creep of what has just transformed'
     shows_in = 'log time in a hold'
     experiment = 'holds of 300 s'
     confused_with = ('thermal_lag', 'ambient_drift')
     kinds = ('arm', 'bench')
     needs_transients = True
+    needs_phase = True
     invertible = False
     parameters = (
-        Parameter('c', '% of l0', 'strain per factor e of time after a step through the whole '
-                  'drive', 0.01, 0.5, 0.0, (0.03, 0.15), log=True),
+        Parameter('c', '% of l0', 'strain per factor e of time after a full transformation', 0.01,
+                  0.5, 0.0, (0.03, 0.15), log=True),
         Parameter('t0', 's', 'time from which the logarithm counts', 0.5, 30.0, 3.0, (3.0,),
                   log=True),)
 
-    memory = ('_since', '_drive', '_before', '_direction')
+    memory = ('_since', '_drive', '_phase', '_before', '_direction')
 
     # A change of the drive by less than this share of its range is a hold.
     HOLD = 1e-3
 
     def start(self):
         """Forget the past: cold, before the first step."""
-        self._since = None
-        self._drive = self._before = None
+        self._since = self._drive = None
+        self._phase = self._before = 1.0
         self._direction = 0.0
 
     def advance(self, drive, heat, inputs, surroundings):
         """Return the strain since the last step, in that step's direction."""
         # A ramp is many small steps: what a hold after it shows is the whole ramp's.
-        previous = surroundings.cold if self._drive is None else self._drive
-        change = drive - previous
+        change = drive - (surroundings.cold if self._drive is None else self._drive)
         direction = 0.0
         if abs(change) > self.HOLD * surroundings.drive_range:
             direction = math.copysign(1.0, change)
         if direction != 0.0:
             if direction != self._direction:
-                self._before = previous
+                self._before = self._phase
             self._since = inputs.time
-        self._direction, self._drive = direction, drive
+        self._direction, self._drive, self._phase = direction, drive, inputs.phase
         if self._since is None:
             return 0.0, 1.0
-        size = (drive - self._before) / surroundings.drive_range
-        strain = self.c / 100.0 * size * math.log1p((inputs.time - self._since) / self.t0)
-        return surroundings.sign * surroundings.length * strain, 1.0
+        strain = self._strain(inputs.phase - self._before, inputs.time - self._since, surroundings)
+        return float(strain), 1.0
 
     def drift(self, drive, heat, inputs, surroundings):
         """Return the same for a whole trial at once."""
@@ -244,11 +257,14 @@ class Creep(MaterialEffect):
         last = np.maximum.accumulate(np.where(direction != 0.0, rows, -1))
         turned = (direction != 0.0) & (direction != np.concatenate(([0.0], direction[:-1])))
         begun = np.maximum.accumulate(np.where(turned, rows, 0))
-        before = np.concatenate(([surroundings.cold], drive))[begun]
-        size = (drive - before) / surroundings.drive_range
+        before = np.concatenate(([1.0], inputs.phase))[begun]
         held = np.where(last >= 0, inputs.time - inputs.time[last], 0.0)
-        strain = self.c / 100.0 * size * np.log1p(held / self.t0)
-        return surroundings.sign * surroundings.length * strain, np.ones(len(drive))
+        return self._strain(inputs.phase - before, held, surroundings), np.ones(len(drive))
+
+    def _strain(self, change, held, surroundings):
+        """Return it for a change of the phase; nothing where that is not known."""
+        strain = self.c / 100.0 * np.nan_to_num(change) * np.log1p(held / self.t0)
+        return -surroundings.sign * surroundings.length * strain
 
 
 class Fatigue(MaterialEffect):

@@ -46,7 +46,6 @@ class ViscousFriction(MechanismEffect):
     experiment = 'let the arm swing freely'
     confused_with = ('thermal_lag', 'latency')
     needs_transients = True
-    needs_every_row = True
     invertible = False
     parameters = (
         Parameter('b', 'N m s/rad', 'moment per angular velocity', 0.001, 4.0, 0.0, (0.05, 1.0),
@@ -62,21 +61,23 @@ class Inertia(MechanismEffect):
 
     id = 'inertia'
     sentence = 'The mass of arm and payload makes it ring after a fast step.'
-    equation = 'tau += I d2theta/dt2'
+    equation = 'tau += I d2theta/dt2 + b dtheta/dt'
     source = "Newton's second law"
     shows_in = 'ringing'
     experiment = 'pluck the arm and log fast'
     confused_with = ('viscous_friction',)
+    replaces = ('viscous_friction',)
     needs_transients = True
-    needs_every_row = True
     invertible = False
     parameters = (
-        Parameter('I', 'kg m^2', 'moment of inertia about the pivot', 0.001, 0.1, 0.0, (0.01,),
-                  log=True),)
+        Parameter('I', 'kg m^2', 'moment of inertia about the pivot', 0.001, 0.1, 0.0,
+                  (0.01,), log=True),
+        Parameter('b', 'N m s/rad', 'moment per angular velocity, by which the ringing dies away',
+                  0.001, 4.0, 0.0, (0.02,), log=True),)
 
     def resistance(self):
-        """Return the moment of inertia."""
-        return 0.0, 0.0, self.I
+        """Return viscous coefficient and moment of inertia."""
+        return 0.0, self.b, self.I
 
 
 class FrameTilt(MechanismEffect):

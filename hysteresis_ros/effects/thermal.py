@@ -19,6 +19,10 @@ from hysteresis_ros.effects.base import Parameter
 from hysteresis_ros.effects.stages import DriveEffect
 
 
+# A rate [1/s] that stands for one without bound, which times no time would be no number.
+FASTEST = 1e12
+
+
 class ThermalEffect(DriveEffect):
     """An effect on the heat that the muscle feels."""
 
@@ -80,10 +84,39 @@ class FirstOrderLag(ThermalEffect):
     def step(self, value, step, phase, surroundings):
         """Advance Eq. 1 by `step` [s] towards `value`."""
         if self._heat is None:
-            # A trial starts cold: without drive, but at the first one where that is a temperature.
-            self._heat = value if surroundings.drive == 'temperature' else 0.0
-        self._heat = value + (self._heat - value) * self._decay(value, step)
+            self._heat = self._cold(value, surroundings)
+        before = phase if self._phase is None else self._phase
+        if math.isfinite(phase):
+            self._phase = phase
+        self._heat = (value + (self._heat - value) * self._decay(value, step)
+                      + float(self._released(before, phase, surroundings)))
         return self._heat
+
+    @staticmethod
+    def _cold(value, surroundings):
+        """Return the heat before a trial: none, or the first one where that is a temperature."""
+        return value if surroundings.drive == 'temperature' else 0.0
+
+    def _released(self, before, phase, surroundings):
+        """Return the heat that changing from the phase `before` gives off."""
+        return 0.0 * np.nan_to_num(phase)
+
+    def forward(self, signal, inputs, surroundings):
+        """Do what `step` does for a whole trial, with all decays computed at once."""
+        self.start()
+        steps = np.broadcast_to(inputs.step, np.shape(signal))
+        up, down = (np.exp(-min(self.rate(rising), FASTEST) * steps).tolist()
+                    for rising in (True, False))
+        phases = np.broadcast_to(inputs.phase, np.shape(signal))
+        released = self._released(np.concatenate((phases[:1], phases[:-1])), phases, surroundings)
+        values = signal.tolist()
+        heat = self._cold(values[0], surroundings)
+        heats = []
+        for value, rise, fall, given in zip(values, up, down, released.tolist()):
+            heat = value + (heat - value) * (rise if value > heat else fall) + given
+            heats.append(heat)
+        self._heat, self._phase = heat, float(phases[-1])
+        return np.array(heats)
 
     def inverse(self, signal, inputs, surroundings):
         """Return the input that brings the heat to `signal` in ``inputs.step`` seconds."""
@@ -155,19 +188,9 @@ class LatentHeat(FirstOrderLag):
         Parameter('latent', '1', 'h: latent heat over the heat stored at full drive', 0.05, 1.0,
                   0.0, (0.2, 0.5), log=True),)
 
-    def step(self, value, step, phase, surroundings):
-        """Advance with what the change of phase gives off."""
-        released = self._released(phase, surroundings)
-        if math.isfinite(phase):
-            self._phase = phase
-        self._heat = super().step(value, step, phase, surroundings) + released
-        return self._heat
-
-    def _released(self, phase, surroundings):
-        """Return the heat that changing from the phase before to `phase` gives off."""
-        if self._phase is None or not math.isfinite(phase):
-            return 0.0
-        return self.latent * surroundings.heat * (phase - self._phase)
+    def _released(self, before, phase, surroundings):
+        """Return it; nothing where the phase is not known."""
+        return np.nan_to_num(self.latent * surroundings.heat * (phase - before))
 
 
 class AmbientTemperature(ThermalEffect):

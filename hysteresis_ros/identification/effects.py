@@ -2,8 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects that belong to the bench model: found in its own tables, or named by the user."""
 
-from hysteresis_ros.diagnosis.diagnose import diagnose
+import numpy as np
+
+from hysteresis_ros.diagnosis.diagnose import PRACTICAL, diagnose
 from hysteresis_ros.diagnosis.extend import extend
+from hysteresis_ros.diagnosis.fit import Fitter
+from hysteresis_ros.diagnosis.problem import problem_for
+from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, measure
 
@@ -24,7 +29,8 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
     length, force : Measurement
         The bench tables; `force` only for the metrics.
     names : sequence of str, optional
-        Effects to add; by default those that the length table proves.
+        Effects to add; by default those that the length table proves, and beside them those that
+        every loaded muscle has.
     length_trials, force_trials : sequence of numbers, optional
         Trials that are fitted; the others verify.
     jobs : int
@@ -49,9 +55,40 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
     fitted = length.select(sorted(set(length.column('trial')[rows].tolist())))
     if names is None:
         names = diagnose(model, [fitted], jobs=jobs, progress=progress).missing
+        names = _with_universal(model, names, fitted)
     if not names:
         return model, []
     extension = extend(model, names, [fitted])
     extended = extension.model
     measure(extended, force, force_trials, length, length_trials)
     return extended, extension.added
+
+
+def _with_universal(model, names, fitted):
+    """
+    Return the effects found, and those that every loaded muscle has where they do no harm.
+
+    Constant loads on a bench hardly tell the wire's own elasticity from the growth of its stroke,
+    and few rows may not prove either; but on an arm the load moves while the wire does. What is
+    known beforehand needs no proof against chance, only held-out rows that do not speak against it.
+    """
+    fitter = Fitter(problem_for(model, [fitted]))
+    rest = [name for name, kind in catalogue().items()
+            if kind.universal and name not in names and kind.available(model.surroundings)]
+    if not rest:
+        return names
+
+    def held_out(chosen):
+        effects, implausible = [], []
+        if chosen:
+            extension = extend(model, chosen, [fitted])
+            effects, implausible = extension.added, extension.implausible
+        fit = fitter.cross_validate(model.effects, fitter.fit(model.effects, effects))
+        return np.inf if implausible else fitter.error(fit.held_out)
+
+    # Alone they have to help; beside one that was found they only must not harm.
+    limit = held_out(names) * ((1.0 + PRACTICAL) if names else (1.0 - PRACTICAL))
+    for more in (rest, *([name] for name in rest)):
+        if held_out([*names, *more]) <= limit:
+            return [*names, *more]
+    return names

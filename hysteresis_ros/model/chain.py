@@ -53,7 +53,7 @@ class Chain:
         self.material = [e for e in ordered if isinstance(e, MaterialEffect)]
         self.mechanism = [e for e in ordered if isinstance(e, MechanismEffect)]
         self.sensor = [e for e in ordered if isinstance(e, SensorEffect)]
-        self.needs_phase = any(effect.needs_phase for effect in drive)
+        self.needs_phase = any(effect.needs_phase for effect in ordered)
         # A fan changes gain and time constant together (d1 stands in both).
         for effect in self.thermal:
             effect.speed = math.prod(other.exchange for other in self.thermal)

@@ -151,6 +151,10 @@ class Everett:
               column[b, a].item(), density[b, a].item(), self._half[a], self._half[b])
              for b in range(a)] for a in range(levels)]
 
+    def __deepcopy__(self, memo: dict) -> 'Everett':
+        """Return itself: nothing of it changes, and its tables are most of an operator."""
+        return self
+
     def at(self, alpha: float, beta: float) -> float:
         """Return E at one point, nodes[0] <= beta <= alpha <= nodes[-1]."""
         a = bisect_right(self._inner, alpha)
