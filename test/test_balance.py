@@ -188,46 +188,65 @@ def test_the_cold_arm_has_sunk_to_where_friction_holds_it():
     assert theta < balance().settle(0.5) - 0.01
 
 
-def free_arm(x_of_time, duration, viscous, inertia, start):
+def free_arm(x, duration, viscous, inertia, start, compliance=0.0):
     """Integrate the arm on a wire without hysteresis, as its equation of motion says."""
-    def force(theta):
-        # A reversible wire: length = slope * u.
-        return (GEOMETRY.length(theta) - INTERCEPT) / SLOPE
-
     def slope(t, y):
         theta, speed = y
-        pull = 3.0 * (force(theta) + x_of_time(t)) * GEOMETRY.moment_arm(theta)
+        # A reversible wire, length = slope * (F - x) + compliance * F, that cannot push.
+        force = (GEOMETRY.length(theta) - INTERCEPT + SLOPE * x) / (SLOPE + compliance)
+        pull = 3.0 * max(force, 0.0) * GEOMETRY.moment_arm(theta)
         moment = GEOMETRY.load_moment(theta) - pull
         if inertia == 0.0:
             return [moment / viscous, 0.0]
         return [speed, (moment - viscous * speed) / inertia]
 
-    return integrate.solve_ivp(slope, (0.0, duration), [start, 0.0], rtol=1e-9, atol=1e-9,
-                               dense_output=True, method='LSODA').sol
+    return integrate.solve_ivp(slope, (0.0, duration), [start, 0.0], rtol=1e-8, atol=1e-9,
+                               max_step=1e-3, dense_output=True).sol
 
 
 SLOPE, INTERCEPT = 0.8e-3, -6e-3
 
 
-def reversible_balance(name, **values):
+def reversible_balance(**effects):
     """Balance with a second stage that is a straight line."""
     model = bicep_model(length_stage=Linear(SLOPE, INTERCEPT, -30.0, 30.0))
-    model = model.with_effects([effect_of(model, name, **values)])
+    model = model.with_effects(
+        [effect_of(model, name, **values) for name, values in effects.items()])
     return model.balance(model.chain())
 
 
-@pytest.mark.parametrize('name, values, viscous, inertia, step, tolerance', [
-    ('viscous_friction', {'b': 0.5}, 0.5, 0.0, 0.005, 0.03),
-    ('inertia', {'I': 0.01}, 0.0, 0.01, 0.001, 0.06)])
-def test_motion_is_that_of_the_equation_of_motion(name, values, viscous, inertia, step, tolerance):
-    made = reversible_balance(name, **values)
+@pytest.mark.parametrize('step, tolerance', [(0.001, 0.01), (0.02, 0.06)])
+@pytest.mark.parametrize('effects, viscous, inertia, compliance, x', [
+    ({'viscous_friction': {'b': 0.5}}, 0.5, 0.0, 0.0, 6.0),
+    ({'inertia': {'I': 0.01}}, 0.0, 0.01, 0.0, 6.0),
+    ({'inertia': {'I': 0.01, 'b': 0.05}}, 0.05, 0.01, 0.0, 6.0),
+    # A jerk stretches what is elastic in the muscle.
+    ({'inertia': {'I': 0.02}, 'series_compliance': {'compliance': 0.3}}, 0.0, 0.02, 0.3e-3, 6.0),
+    ({'viscous_friction': {'b': 0.5}, 'series_compliance': {'compliance': 0.3}},
+     0.5, 0.0, 0.3e-3, 6.0),
+    # So hard a pull that the muscle hangs loose on the way.
+    ({'inertia': {'I': 0.05, 'b': 0.02}}, 0.02, 0.05, 0.0, 14.0)])
+def test_motion_is_that_of_the_equation_of_motion(
+        effects, viscous, inertia, compliance, x, step, tolerance):
+    made = reversible_balance(**effects)
     start = made.settle(4.0)
-    true = free_arm(lambda t: 6.0, 0.5, viscous, inertia, start)
+    true = free_arm(x, 0.5, viscous, inertia, start, compliance)
     time = step * np.arange(1, int(0.5 / step) + 1)
-    seen = np.array([made.step(6.0, step) for _ in time])
+    seen = np.array([made.step(x, step) for _ in time])
     stroke = np.ptp(true(time)[0])
     assert stroke > 0.02
     assert np.max(np.abs(seen - true(time)[0])) < tolerance * stroke
+
+
+def test_the_pull_that_leaves_the_muscle_loose_does_so():
+    made = reversible_balance(inertia={'I': 0.05, 'b': 0.02})
+    made.settle(4.0)
+    loads = []
+    for _ in range(60):
+        made.step(14.0, 0.01)
+        loads.append(made.operators[0].input + 14.0)
+    assert min(loads) == pytest.approx(0.0, abs=1e-9)
+    assert max(loads) > 5.0
 
 
 def test_viscous_friction_vanishes_in_the_long_run_and_blocks_in_the_short():

@@ -9,7 +9,8 @@ import pytest
 
 from hysteresis_ros.diagnosis import structure
 from hysteresis_ros.diagnosis.fit import Fitter
-from hysteresis_ros.diagnosis.leftover import examine, flexible, lasting_step
+from hysteresis_ros.diagnosis.candidates import consider, possible
+from hysteresis_ros.diagnosis.leftover import event_of, examine, flexible, lasting_step
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 from hysteresis_ros.diagnosis.problem import problem_for, sensor_resolution
 from hysteresis_ros.diagnosis.significance import (
@@ -192,6 +193,51 @@ def test_noise_has_no_step_and_few_rows_none_at_all():
     assert lasting_step(np.array([0.0, 0.0, 1.0, 1.0])) == (0, 0.0)
 
 
+def test_a_drift_is_no_event():
+    """It, too, is higher at its end than at its start, but not at once."""
+    rng = np.random.default_rng(8)
+    drift = np.linspace(-1.0, 1.0, 300) + 0.1 * rng.standard_normal(300)
+    assert lasting_step(drift)[1] == 0.0
+    shape = 1.0 + np.cos(0.3 * np.arange(300))
+    assert lasting_step(shape * np.linspace(0.0, 1.0, 300), shape)[1] == 0.0
+
+
+def test_a_step_of_the_length_shows_in_proportion_to_the_sensitivity(problem):
+    """A crimp that slips moves the arm more where the arm answers more."""
+    rows = len(problem.measured)
+    sensitivity = 60.0 + 50.0 * np.sin(0.7 * np.arange(rows))
+    residual = 1e-3 * sensitivity * (np.arange(rows) >= 100)
+    time, share = event_of(problem, residual, sensitivity)
+    assert time == problem.clock[100] and share == pytest.approx(1.0)
+    assert event_of(problem, residual)[1] < 0.8
+    assert event_of(problem, np.zeros(rows)) == (None, 0.0)
+
+
+def test_effects_that_the_bench_has_shown_may_differ_on_the_arm():
+    """Those of the wire are tried again, those of the arm are not."""
+    model = bicep_model(['series_compliance', 'payload_error', 'heating_cooling_asymmetry'])
+    names, _ = possible(problem_for(model, [runs(model, step=0.1)]), [])
+    assert 'series_compliance' in names
+    assert 'payload_error' not in names
+    # A lag is a part of the asymmetry, so it cannot be missing beside it.
+    effect = effect_of(model, 'heating_cooling_asymmetry')
+    names, _ = possible(problem_for(bicep_model(), [runs(model, step=0.1)]), [effect])
+    assert not {'thermal_lag', 'heating_cooling_asymmetry'} & set(names)
+
+
+def test_another_compliance_than_on_the_bench_takes_the_place_of_the_first():
+    """It is fitted anew, from what the bench has found; both together would count it twice."""
+    model = bicep_model(['series_compliance'])
+    other = model.with_effects([effect_of(model, 'series_compliance', compliance=0.25)])
+    recorded = runs(other)
+    problem = problem_for(model, [recorded])
+    fitter = Fitter(problem)
+    base = fitter.cross_validate(model.effects, fitter.fit(model.effects, []))
+    found = consider(fitter, [], base, 'series_compliance')
+    assert found.effect.values['compliance'] == pytest.approx(0.25, rel=0.02)
+    assert found.rmse < 0.05 * fitter.error(base.held_out)
+
+
 def test_a_flexible_regression_finds_smooth_dependence_and_leaves_noise():
     """The share on held-out rows is that of the planted part."""
     rng = np.random.default_rng(6)
@@ -222,6 +268,17 @@ def test_an_event_has_the_time_since_the_recording_began():
     assert left.event_share > 0.99
     assert left.event == problem.clock[row]
     assert np.all(np.diff(problem.clock) > 0.0)
+
+
+def test_one_signal_alone_may_show_what_all_together_do_not():
+    """Few rows and many signals: the regression on all of them learns little."""
+    model = bicep_model()
+    problem = problem_for(model, [runs(model, sizes=[20, 20, 20])])
+    rng = np.random.default_rng(9)
+    problem.signals.update({f'noise{n}': rng.standard_normal(60) for n in range(12)})
+    drive = problem.signals['drive']
+    left = examine(problem, np.sin(drive) + 0.2 * rng.standard_normal(60))
+    assert left.signal == 'drive' and left.explained > 0.5
 
 
 def test_decoys_have_the_size_that_the_bench_found_and_the_noise(problem):

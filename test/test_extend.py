@@ -127,6 +127,14 @@ def test_names_that_make_no_sense_are_refused(base, recordings, names, words):
         extend(model, names, recordings[:1])
 
 
+def test_an_effect_that_the_bench_has_shown_is_fitted_anew_to_the_arm(base, recordings):
+    """The wires of the arm are others; a second compliance beside the first would be no effect."""
+    model = base.with_effects([effect_of(base, 'series_compliance')])
+    extended = extend(model, ['series_compliance'], recordings[:1]).model
+    assert [effect.id for effect in extended.effects] == ['series_compliance']
+    assert extended.effects[0].values != model.effects[0].values
+
+
 def test_an_effect_of_the_arm_is_not_fitted_to_a_bench(base):
     """No bench table knows the payload."""
     steps = np.arange(12.0)

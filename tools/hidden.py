@@ -149,6 +149,8 @@ def main():
                   for group, protocol, effects, seed in chosen]
     if args.only:
         chosen = [case for case in chosen if args.only in (case[0], *case[2])]
+    # Seed by seed, so that what was scored so far is a fair sample.
+    chosen.sort(key=lambda case: case[-1])
     results = []
     parallel = joblib.Parallel(n_jobs=args.jobs, return_as='generator')
     seeds = sorted({case[-1] for case in chosen})

@@ -30,9 +30,9 @@ GRID = math.radians(0.1)
 LONGEST_TRANSIENT = 5.0
 # Longest step that still shows how an arm rings (its period is about 0.5 s).
 LONGEST_INERTIAL_STEP = 0.034
-# An arm slower than this [rad/s], under a step of x of less than this share of H2's range, does
-# not ring, and is followed in longer steps.
-CALM_SPEED, CALM_STEP, FADING = 0.02, 0.003, 0.7
+# An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
+# of less than this share of H2's range, does not ring, and is followed in longer steps.
+CALM, CALM_STEP, FADING = 0.01, 0.01, 0.7
 # How exactly the share of its friction is known that an arm at rest makes use of.
 STUCK_TOLERANCE = 1e-10
 
@@ -72,6 +72,7 @@ class ArmBalance:
         self._rigid = all(line.demand == self._lines[0].demand for line in self._lines.values())
         self.has_dynamics = self.viscous > 0.0 or self.inertia > 0.0
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
+        self._heaviest = max(float(np.max(np.abs(statics.moment))), 1e-12)
         self._calm = CALM_STEP * (operator.upper - operator.lower)
         self._bundle = Bundle(operator, chain.offsets) if len(chain.offsets) > 1 else None
         self.operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
@@ -89,7 +90,7 @@ class ArmBalance:
         self._angle = self._inputs = None
         self._velocity, self._before = 0.0, None
         self._x = math.inf
-        self._motion = 0.0
+        self._jerk = self._acceleration = 0.0
 
     def settle(self, x: float) -> float:
         """Take up the state of rest under `x`, the cold one, and return its angle [rad]."""
@@ -115,15 +116,16 @@ class ArmBalance:
             Angle [rad].
         """
         if self.inertia > 0.0 and LONGEST_INERTIAL_STEP < dt < LONGEST_TRANSIENT and (
-                abs(x - self._x) > self._calm or self._motion > CALM_SPEED):
+                abs(x - self._x) > self._calm or self._jerk > CALM):
             pieces = math.ceil(dt / LONGEST_INERTIAL_STEP)
             for _ in range(pieces - 1):
                 self._advance(x, dt / pieces, offset, factor)
             dt /= pieces
         self._x = x
         angle = self._advance(x, dt, offset, factor)
-        # A ringing arm stands still for a moment where it turns.
-        self._motion = max(abs(self._velocity), FADING * self._motion)
+        # What rings is not accelerated for a moment in the middle of its way.
+        self._jerk = max(self.inertia * abs(self._acceleration) / self._heaviest,
+                         FADING * self._jerk)
         return angle
 
     def _advance(self, x, dt, offset, factor):
@@ -226,9 +228,9 @@ class ArmBalance:
     def _keep_motion(self, angle, dt):
         """Note the velocity with which the arm gets to `angle`; none at an end or at rest."""
         if not dt or angle in (self._theta[0], self._theta[-1]):
-            self._velocity, self._before = 0.0, None
+            self._velocity, self._acceleration, self._before = 0.0, 0.0, None
             return
-        velocity, _ = self._moved(angle, dt)
+        velocity, self._acceleration = self._moved(angle, dt)
         self._before = dt, self._angle, self._velocity
         self._velocity = velocity
 

@@ -158,11 +158,15 @@ def _consider_set(fitter, effects) -> Fit | None:
     return best if finite else None
 
 
-def consider_sets(fitter, effects, most: int, jobs: int, progress) -> list[Fit]:
-    """Fit and cross-validate every set of at most `most` of the effects, in parallel."""
-    sets = [subset for size in range(1, most + 1)
+def subsets(effects, most: int) -> list[list]:
+    """Return every set of at most `most` of the effects in which none contains another."""
+    return [list(subset) for size in range(1, most + 1)
             for subset in itertools.combinations(effects, size)
             if not any(other.id in effect.replaces for effect in subset for other in subset)]
+
+
+def consider_sets(fitter, sets, jobs: int, progress) -> list[Fit]:
+    """Fit and cross-validate sets of effects, in parallel."""
     parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
-    tasks = (joblib.delayed(_consider_set)(fitter, list(subset)) for subset in sets)
+    tasks = (joblib.delayed(_consider_set)(fitter, effects) for effects in sets)
     return [fit for fit in progress(parallel(tasks), len(sets)) if fit is not None]

@@ -9,12 +9,13 @@ What is left after that is compared with what the base model and the sensor leav
 """
 
 import dataclasses
+import itertools
 
 import numpy as np
 
 from hysteresis_ros.diagnosis import leftover, significance, structure
 from hysteresis_ros.diagnosis.candidates import (
-    Candidate, consider_all, consider_sets, possible, present)
+    Candidate, consider_all, consider_sets, possible, present, subsets)
 from hysteresis_ros.diagnosis.fit import Fitter, beside
 from hysteresis_ros.diagnosis.problem import problem_for
 from hysteresis_ros.effects import catalogue
@@ -31,6 +32,8 @@ MOST_SEEDS = 3
 MOST_IN_SETS = 5
 # Effects of which all pairs are tried on the arm.
 MOST_IN_PAIRS = 5
+# A pair is fitted if a straight extrapolation comes within this factor of the best mean square.
+LINEAR_MARGIN = 1.5
 # Effects whose signatures agree more than this cannot be told apart.
 CONFUSED = 0.9
 # The base model's error on the arm may be this many times that of the bench's verification.
@@ -172,7 +175,7 @@ class _Diagnostician:
         # An effect that is fitted alone may need impossible values to stand in for two, so sets
         # are grown from the best plausible one and from the best of all.
         if problem.refits:
-            sets = consider_sets(self.fitter, self._few(first), MOST_EFFECTS, self.jobs,
+            sets = consider_sets(self.fitter, subsets(self._few(first), MOST_EFFECTS), self.jobs,
                                  self.progress)
             sets = [fit for fit in sets if not fit.implausible() and self._helps(fit)]
         else:
@@ -246,10 +249,15 @@ class _Diagnostician:
         if not grown or all(len(fit.effects) == 1 and self.fitter.error(fit.held_out)
                             <= STRUCTURE_MARGIN * self.floor for fit in grown):
             return []
-        leading = [candidate.effect for candidate in first
-                   if self._significant(candidate, self.current)][:MOST_IN_PAIRS]
-        pairs = [fit for fit in consider_sets(self.fitter, leading, 2, self.jobs, self.progress)
-                 if len(fit.effects) == 2 and not fit.implausible()]
+        # What was grown from one effect has been tried with all others.
+        seeds = {fit.effects[0].id for fit in grown}
+        leading = [candidate for candidate in first
+                   if not seeds & {candidate.id, *candidate.effect.replaces} and self._significant(candidate, self.current)][:MOST_IN_PAIRS]
+        worth = [[one.effect, other.effect] for one, other in itertools.combinations(leading, 2)
+                 if other.id not in one.effect.replaces and one.id not in other.effect.replaces
+                 and self._promising(one, other, grown)]
+        pairs = [fit for fit in consider_sets(self.fitter, worth, self.jobs, self.progress)
+                 if not fit.implausible()]
         singles = [fit for fit in grown if len(fit.effects) == 1]
         best = min(singles, key=lambda fit: self.fitter.error(fit.held_out), default=None)
         if best is None or not pairs:
@@ -260,6 +268,15 @@ class _Diagnostician:
                            for fit in pairs])
         values = significance.family_p_values(gains, chance)
         return [fit for fit, value in zip(pairs, values) if value <= SIGNIFICANCE]
+
+    def _promising(self, one, other, grown):
+        """Whether what two effects do alone, scaled and added, explains more than what is found."""
+        columns = np.column_stack([one.signature, one.fit.jacobian,
+                                   other.signature, other.fit.jacobian])
+        left = self.problem.measured - self.base.predicted
+        error = significance.held_out_errors(columns, left[None, :], self.problem.fold)[0]
+        best = min(self.fitter.error(fit.held_out) for fit in grown)
+        return error < LINEAR_MARGIN * best ** 2
 
     def _draw_structure(self):
         problem = self.problem

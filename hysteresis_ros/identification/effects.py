@@ -7,6 +7,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.diagnose import PRACTICAL, diagnose
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.fit import Fitter
+from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.diagnosis.problem import problem_for
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import IdentificationError
@@ -54,8 +55,8 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
         raise IdentificationError('no trial is left to fit')
     fitted = length.select(sorted(set(length.column('trial')[rows].tolist())))
     if names is None:
-        names = diagnose(model, [fitted], jobs=jobs, progress=progress).missing
-        names = _with_universal(model, names, fitted)
+        found = diagnose(model, [fitted], jobs=jobs, progress=progress).effects
+        names = _with_universal(model, found, fitted)
     if not names:
         return model, []
     extension = extend(model, names, [fitted])
@@ -64,31 +65,35 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
     return extended, extension.added
 
 
-def _with_universal(model, names, fitted):
+def _with_universal(model, found, fitted):
     """
-    Return the effects found, and those that every loaded muscle has where they do no harm.
+    Name the effects found, and those that every loaded muscle has where they do no harm.
 
     Constant loads on a bench hardly tell the wire's own elasticity from the growth of its stroke,
     and few rows may not prove either; but on an arm the load moves while the wire does. What is
     known beforehand needs no proof against chance, only held-out rows that do not speak against it.
     """
     fitter = Fitter(problem_for(model, [fitted]))
-    rest = [name for name, kind in catalogue().items()
+    names = [effect.id for effect in found]
+    rest = [_usual(kind(model.surroundings)) for name, kind in catalogue().items()
             if kind.universal and name not in names and kind.available(model.surroundings)]
     if not rest:
         return names
 
-    def held_out(chosen):
-        effects, implausible = [], []
-        if chosen:
-            extension = extend(model, chosen, [fitted])
-            effects, implausible = extension.added, extension.implausible
-        fit = fitter.cross_validate(model.effects, fitter.fit(model.effects, effects))
-        return np.inf if implausible else fitter.error(fit.held_out)
+    def held_out(effects):
+        fit = fitter.fit(model.effects, effects)
+        if fit.implausible():
+            return np.inf
+        return fitter.error(fitter.cross_validate(model.effects, fit).held_out)
 
     # Alone they have to help; beside one that was found they only must not harm.
-    limit = held_out(names) * ((1.0 + PRACTICAL) if names else (1.0 - PRACTICAL))
-    for more in (rest, *([name] for name in rest)):
-        if held_out([*names, *more]) <= limit:
-            return [*names, *more]
+    limit = held_out(found) * ((1.0 + PRACTICAL) if names else (1.0 - PRACTICAL))
+    for more in (rest, *([effect] for effect in rest)):
+        if held_out([*found, *more]) <= limit:
+            return [*names, *(effect.id for effect in more)]
     return names
+
+
+def _usual(effect):
+    starts = starts_of(effect, 'bench')
+    return starts[len(starts) // 2]
