@@ -149,8 +149,8 @@ def main():
                   for group, protocol, effects, seed in chosen]
     if args.only:
         chosen = [case for case in chosen if args.only in (case[0], *case[2])]
-    # Seed by seed, so that what was scored so far is a fair sample.
-    chosen.sort(key=lambda case: case[-1])
+    # Seed by seed, so that what is scored so far is a fair sample.
+    chosen.sort(key=lambda case: (case[0] in ('strong', 'weak'), case[-1]))
     results = []
     parallel = joblib.Parallel(n_jobs=args.jobs, return_as='generator')
     seeds = sorted({case[-1] for case in chosen})
@@ -163,13 +163,17 @@ def main():
               f'seed {row["seed"]}: {row["verdict"]} {row["missing"]} {row["alternatives"]} '
               f'{row["rmse_before"]:.4f} -> {row["rmse_after"]:.4f} ({row["structure"]:.4f}) '
               f'{row["top"]} {row["seconds"]:.0f} s', file=sys.stderr, flush=True)
-    scores = score(results)
-    for name, (value, count) in scores.items():
+        write(results, args.output)
+    for name, (value, count) in score(results).items():
         text = 'no case' if value is None else f'{value:.4g}'
         print(f'{name:64s} {text:>8s}   ({count} cases)')
-    Path(args.output).write_text(json.dumps(
-        {'scores': {name: value for name, (value, _) in scores.items()},
-         'cases': results}, indent=1) + '\n', encoding='utf-8')
+
+
+def write(results, path):
+    """Write scores and cases; what is there when the grid is interrupted counts."""
+    scores = {name: value for name, (value, _) in score(results).items()}
+    Path(path).write_text(json.dumps({'scores': scores, 'cases': results}, indent=1) + '\n',
+                          encoding='utf-8')
 
 
 if __name__ == '__main__':

@@ -6,9 +6,9 @@ The balance between muscle and arm: the angle for a drive and a memory.
 The muscle stretches to ``L = L0 + S(F) f (H2[u] - L0) + e(F) + o`` with ``u = F - x``, where x is
 the first stage's output (H1[V] in the paper's model) and F is what the arm asks for at its angle.
 At rest ``L(theta) = H2[F(theta) - x]``; the unknown is u, because H2 then gives everything else.
-Dry friction lets F lie in a band, inside which the arm sticks; viscous friction and inertia (`swing`)
-add what the present velocity and acceleration cost: by backward differences, of second order over
-equal steps.
+Dry friction lets F lie in a band, inside which the arm sticks; viscous friction and inertia add
+what the present velocity and acceleration cost (see `swing`): by backward differences, of second
+order over equal steps.
 """
 
 import bisect

@@ -251,8 +251,10 @@ class _Diagnostician:
             return []
         # What was grown from one effect has been tried with all others.
         seeds = {fit.effects[0].id for fit in grown}
-        leading = [candidate for candidate in first
-                   if not seeds & {candidate.id, *candidate.effect.replaces} and self._significant(candidate, self.current)][:MOST_IN_PAIRS]
+        leading = [
+            candidate for candidate in first
+            if not seeds & {candidate.id, *candidate.effect.replaces}
+            and self._significant(candidate, self.current)][:MOST_IN_PAIRS]
         worth = [[one.effect, other.effect] for one, other in itertools.combinations(leading, 2)
                  if other.id not in one.effect.replaces and one.id not in other.effect.replaces
                  and self._promising(one, other, grown)]
