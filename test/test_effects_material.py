@@ -163,6 +163,23 @@ def test_a_ramp_of_small_steps_creeps_like_its_whole():
     assert offset[-1] == pytest.approx(-0.001 * 0.27 * 0.4 * math.log1p(5.0 / 2.0))
 
 
+def test_creep_that_is_kept_is_the_sum_over_all_steps():
+    made = effect('creep', c=0.1, t0=2.0, kept=1.0)
+    time = 0.5 * np.arange(1, 801)
+    phase = np.where(time <= 100.0, 0.4, 0.8)
+    offset, _ = made.drift(np.full(800, 4.0), np.full(800, 16.0), inputs(time, phase=phase), WIRE)
+    begun = -0.6 * np.log1p((time - 0.25) / 2.0) + 0.4 * np.log1p(
+        np.maximum(time - 100.25, 0.0) / 2.0)
+    np.testing.assert_allclose(offset, 0.001 * 0.27 * begun, atol=0.3 * 0.001 * 0.27)
+    # Row by row it is the same.
+    made.start()
+    trial = inputs(time, phase=phase)
+    for n in range(0, 40):
+        row = Inputs(*(float(column[n]) for column in trial))
+        assert made.advance(4.0, 16.0, row, WIRE)[0] == pytest.approx(offset[n], abs=1e-15)
+        made.restore(made.save())
+
+
 def test_nothing_creeps_before_the_first_step_or_where_the_phase_is_not_known():
     made = effect('creep', c=0.1)
     offset, _ = made.drift(np.zeros(3), np.zeros(3), inputs([1, 9, 99], phase=[1, 1, 1]), WIRE)

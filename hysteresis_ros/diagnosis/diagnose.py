@@ -40,11 +40,17 @@ CONFUSED = 0.9
 STRUCTURE_MARGIN = 1.6
 # More than this share of the first mean square left over means that the cause is not known.
 UNEXPLAINED = {'arm': 0.08, 'bench': 0.3}
+# A structured error on the bench below this share of the response's range is that of any model.
+LEAST_STRUCTURE = 0.02
+# A held-out error on the bench above this share of the range: the model predicts nothing.
+LARGEST_ERROR = 0.15
 # Share of the residual's mean square that one event has to explain to count as the cause.
 EVENT_SHARE = 0.5
 # A drive that moves over less than this share of its range excites nothing.
 LEAST_DRIVE = 0.05
 MOST_ALTERNATIVES = 3
+# Effects that are fitted beside those found, the most promising of a straight extrapolation.
+MOST_RIVALS = 8
 # Rivals that are fitted again when a set of effects is checked.
 RIVALS = 6
 
@@ -214,8 +220,10 @@ class _Diagnostician:
         return [candidate.effect for candidate in first][:MOST_IN_SETS]
 
     def _helps(self, fit) -> bool:
-        """Whether a set of effects explains more than chance, of mostly one sign."""
+        """Whether a set of effects explains more than chance, of mostly one sign, and enough."""
         problem = self.problem
+        if self.fitter.error(fit.held_out) > (1.0 - PRACTICAL) * self.before:
+            return False
         gains = significance.block_sums(
             (problem.measured - self.base.held_out) ** 2
             - (problem.measured - fit.held_out) ** 2, problem.block)
@@ -297,16 +305,18 @@ class _Diagnostician:
 
     def _worth_another_look(self, first, fit):
         """Effects that have anything to say about what is left, judged by their signatures."""
+        if self.problem.refits:
+            return [candidate.id for candidate in first]
         left = self.problem.measured - fit.predicted
         limit = (1.0 - PRACTICAL) * float(np.mean(left ** 2))
-        worth = []
+        worth = {}
         for candidate in first:
             columns = np.column_stack(
                 [fit.jacobian, candidate.fit.jacobian, candidate.signature])
-            if self.problem.refits or significance.held_out_errors(
-                    columns, left[None, :], self.problem.fold)[0] < limit:
-                worth.append(candidate.id)
-        return worth
+            worth[candidate.id] = significance.held_out_errors(
+                columns, left[None, :], self.problem.fold)[0]
+        names = [name for name in sorted(worth, key=worth.get) if worth[name] < limit]
+        return names[:MOST_RIVALS]
 
     def _test(self, candidates: list[Candidate], current) -> None:
         """Fill in the p values of candidates beside the `current` fit."""
@@ -404,14 +414,16 @@ class _Diagnostician:
     def _sum_up(self, first, hopeless) -> Diagnosis:
         problem = self.problem
         after = self.fitter.error(self.current.held_out)
-        residual = problem.measured - self.current.held_out
+        # Weights that are refitted extrapolate badly, which is no structure.
+        predicted = self.current.predicted if problem.refits else self.current.held_out
+        residual = problem.measured - predicted
         sensitivity = None if problem.refits else structure.sensitivity(problem, self.fixed)
         left = leftover.examine(problem, residual, sensitivity)
         limit = self._limit()
         excess = max(after ** 2 - limit ** 2, 0.0) if after > limit else 0.0
         unexplained = excess / max(self.before ** 2, 1e-300)
         if problem.refits:
-            unexplained = left.explained * (after / self.before) ** 2
+            unexplained = self._unexplained_on_bench(left.explained, after)
         # Something that happened once explains what no steady effect can.
         event, share = leftover.event_of(
             problem, problem.measured - self.base.held_out, sensitivity)
@@ -442,6 +454,16 @@ class _Diagnostician:
             not_excited={**hopeless, **hidden},
             event=event if verdict == 'unknown' else None,
             signal=left.signal if verdict == 'unknown' else '')
+
+    def _unexplained_on_bench(self, explained, after) -> float:
+        """Share of the first mean square that has structure, where that matters to a user."""
+        error, span = self.fitter.error(self.current.predicted), np.ptp(self.problem.measured)
+        if after > LARGEST_ERROR * span:
+            # It fits what it was given and says nothing of another trial: not such a muscle.
+            return 1.0
+        if error < LEAST_STRUCTURE * span:
+            return 0.0
+        return explained * (error / self.fitter.error(self.base.predicted)) ** 2
 
     def _still(self) -> bool:
         """Whether the drive hardly moved."""

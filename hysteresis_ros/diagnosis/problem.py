@@ -202,11 +202,12 @@ class BenchProblem(Problem):
         first = model.first_stage(chain)
         cold = chain.to_heat(model.cold_drive)
         parts, scales, known = [], [], []
+        phases = iter(self._phases(chain) if chain.needs_phase else ())
         for simulator in self.simulators:
             for trial in simulator.trials:
                 inputs = trial.inputs
                 if chain.needs_phase:
-                    inputs = inputs._replace(phase=self._phase(simulator, trial))
+                    inputs = inputs._replace(phase=next(phases))
                 heat = chain.heat(trial.drive, inputs)
                 first.reset()
                 x = first.simulate(np.concatenate(([cold], heat)))
@@ -235,10 +236,14 @@ class BenchProblem(Problem):
                 picked.append(chosen[inside] - trial.rows.start)
         return picked
 
-    def _phase(self, simulator, trial):
-        measured = simulator.measurement.column(self.response)[trial.rows]
-        low, high = self.model.ranges.get(self.response, (measured.min(), measured.max()))
-        return np.clip((measured - low) / max(high - low, 1e-12), 0.0, 1.0)
+    def _phases(self, chain) -> list:
+        """Return for each trial the martensite share as the measured response shows it."""
+        shown = [
+            self.model.sign * (simulator.measurement.column(self.response)[trial.rows]
+                               - chain.stretch(trial.load))
+            for simulator in self.simulators for trial in simulator.trials]
+        low, high = min(map(np.min, shown)), max(map(np.max, shown))
+        return [(high - values) / max(high - low, 1e-300) for values in shown]
 
     def fit_stage(self, effects, train=None, strength=None):
         """

@@ -204,9 +204,9 @@ class Creep(MaterialEffect):
 
     id = 'creep'
     sentence = 'After a step the muscle goes on moving the same way, with the logarithm of time.'
-    equation = ('L += c l0 dxi ln(1 + t / t0) since the last step, dxi the change of the '
-                'martensite share by that step')
-    source = 'logarithmic creep of what has just transformed'
+    equation = ('L += c l0 dxi ln(1 + t / t0), t since the last step and dxi the change of the '
+                'martensite share by it; where kept is 1, summed over all steps so far')
+    source = "logarithmic creep of what has just transformed; Boltzmann's superposition (kept = 1)"
     shows_in = 'log time in a hold'
     experiment = 'holds of 300 s'
     confused_with = ('thermal_lag', 'ambient_drift')
@@ -217,10 +217,16 @@ class Creep(MaterialEffect):
     parameters = (
         Parameter('c', '% of l0', 'strain per factor e of time after a full transformation', 0.01,
                   0.5, 0.0, (0.03, 0.15), log=True),
-        Parameter('t0', 's', 'time from which the logarithm counts', 0.5, 30.0, 3.0, (3.0,),
-                  log=True),)
+        Parameter('t0', 's', 'time from which the logarithm counts', 0.02, 100.0, 3.0, (3.0,),
+                  log=True),
+        Parameter('kept', '1', '0: a step ends the creep of the one before, as in a transformation;'
+                  ' 1: it goes on, as in a polymer', 0.0, 1.0, 0.0, (0.0, 1.0),
+                  choices=(0.0, 1.0)),)
 
-    memory = ('_since', '_drive', '_phase', '_before', '_direction')
+    memory = ('_since', '_drive', '_phase', '_before', '_direction', '_modes')
+
+    # The logarithm as a sum of relaxations, each this many times slower than the one before.
+    MODES, RATIO = 10, 3.0
 
     # A change of the drive by less than this share of its range is a hold.
     HOLD = 1e-3
@@ -230,9 +236,12 @@ class Creep(MaterialEffect):
         self._since = self._drive = None
         self._phase = self._before = 1.0
         self._direction = 0.0
+        self._modes = [0.0] * self.MODES
 
     def advance(self, drive, heat, inputs, surroundings):
         """Return the strain since the last step, in that step's direction."""
+        if self.kept:
+            return self._relax(inputs.phase, self._decays(inputs.step), surroundings), 1.0
         # A ramp is many small steps: what a hold after it shows is the whole ramp's.
         change = drive - (surroundings.cold if self._drive is None else self._drive)
         direction = 0.0
@@ -250,6 +259,12 @@ class Creep(MaterialEffect):
 
     def drift(self, drive, heat, inputs, surroundings):
         """Return the same for a whole trial at once."""
+        if self.kept:
+            self.start()
+            return np.array([
+                self._relax(phase, decays, surroundings)
+                for phase, decays in zip(inputs.phase.tolist(), self._decays(inputs.step))
+            ]), np.ones(len(drive))
         change = np.diff(drive, prepend=surroundings.cold)
         direction = np.where(
             np.abs(change) > self.HOLD * surroundings.drive_range, np.sign(change), 0.0)
@@ -260,6 +275,20 @@ class Creep(MaterialEffect):
         before = np.concatenate(([1.0], inputs.phase))[begun]
         held = np.where(last >= 0, inputs.time - inputs.time[last], 0.0)
         return self._strain(inputs.phase - before, held, surroundings), np.ones(len(drive))
+
+    def _decays(self, step):
+        """Return the share of each relaxation that is left after `step` [s], (rows, modes)."""
+        # With this first time the sum comes to the logarithm, not beside it, in the long run.
+        times = 3.0 * self.t0 * self.RATIO ** np.arange(self.MODES)
+        return np.exp(-np.asarray(step)[..., None] / times)
+
+    def _relax(self, phase, decays, surroundings):
+        """Bring all relaxations nearer to the phase, and return their strain."""
+        if math.isfinite(phase):
+            target = phase - 1.0
+            self._modes = (target + (np.array(self._modes) - target) * decays).tolist()
+        strain = self.c / 100.0 * math.log(self.RATIO) * sum(self._modes)
+        return -surroundings.sign * surroundings.length * strain
 
     def _strain(self, change, held, surroundings):
         """Return it for a change of the phase; nothing where that is not known."""
