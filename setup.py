@@ -95,6 +95,7 @@ setup(
             # launch_testing's plug-in, which ROS installs, breaks with pytest 9.
             'pytest>=7.4,<9',
             'pytest-cov',
+            'dask[distributed]>=2024.1',
             'hypothesis',
             'flake8',
             'flake8-quotes',

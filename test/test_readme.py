@@ -5,9 +5,10 @@
 import inspect
 import re
 import shlex
+import subprocess
 import sys
 
-from model_support import arm_run, bicep_model, wandering_voltage
+from model_support import arm_run, bicep_model, effect_of, wandering_voltage
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from hysteresis_ros.cli.main import COMMANDS, main
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.measurements.csv import write_csv
 
 
 @pytest.fixture(scope='module')
@@ -57,6 +59,23 @@ def test_the_commands_of_the_readme_work_one_after_the_other(
     written = {path.name for path in tmp_path.iterdir()}
     assert written == {'bench', 'arm', 'model.yaml', 'extended.yaml', 'compare.html',
                        'diagnosis.html', 'extended.html'}
+
+
+def test_a_dask_cluster_takes_the_diagnosis_as_the_readme_says(readme, tmp_path):
+    """The script of the README on a local cluster, in a process of its own."""
+    pytest.importorskip('distributed', reason='the extra "cluster" is not installed')
+    script, = (block for block in blocks(readme, 'python') if 'LocalCluster' in block)
+    model = bicep_model()
+    run = arm_run(wandering_voltage(400, 1)[::10])
+    heavier = model.with_effects([effect_of(model, 'payload_error', dm=40.0)])
+    (tmp_path / 'arm').mkdir()
+    write_csv({**run.columns, 'angle': heavier.predict(run)}, tmp_path / 'arm' / 'train.csv')
+    model.save(tmp_path / 'model.yaml')
+    (tmp_path / 'cluster.py').write_text(script, encoding='utf-8')
+    done = subprocess.run([sys.executable, 'cluster.py'], cwd=tmp_path, text=True, timeout=300,
+                          capture_output=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "['payload_error']"
 
 
 @pytest.fixture

@@ -132,12 +132,21 @@ def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
                      before ** 2 - after ** 2, implausible=fit.effects[-1].implausible())
 
 
+def _in_parallel(tasks, jobs):
+    """Return the results in order, one by one where joblib's backend in force can do that."""
+    try:
+        parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
+    except ValueError:
+        # Dask before joblib 1.4 gives all of them at the end.
+        parallel = joblib.Parallel(n_jobs=jobs)
+    return parallel(tasks)
+
+
 def consider_all(fitter, known, current: Fit, names, jobs: int, progress) -> list[Candidate]:
     """Try every effect named, in parallel; see `consider`."""
-    parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
-    tasks = (joblib.delayed(consider)(fitter, known, current, name) for name in names)
+    tasks = [joblib.delayed(consider)(fitter, known, current, name) for name in names]
     found = []
-    for candidate in progress(parallel(tasks), len(names)):
+    for candidate in progress(_in_parallel(tasks, jobs), len(names)):
         if candidate is not None and math.isfinite(candidate.rmse):
             found.append(candidate)
     return sorted(found, key=lambda candidate: candidate.rmse)
@@ -149,7 +158,10 @@ def _consider_set(fitter, effects) -> Fit | None:
     usual = []
     for effect in effects:
         starts = starts_of(effect, problem.kind)
-        usual.append(starts[len(starts) // 2])
+        # What is not fitted but chosen was chosen well by the effect alone.
+        usual.append(starts[len(starts) // 2].with_values(**{
+            parameter.name: effect.values[parameter.name]
+            for parameter in effect.parameters if parameter.choices}))
     with np.errstate(all='ignore'):
         fits = [fitter.fit(problem.model.effects, start) for start in (usual, effects)]
         best = min(fits, key=lambda fit: fitter.error(fit.predicted))
@@ -167,6 +179,5 @@ def subsets(effects, most: int) -> list[list]:
 
 def consider_sets(fitter, sets, jobs: int, progress) -> list[Fit]:
     """Fit and cross-validate sets of effects, in parallel."""
-    parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
-    tasks = (joblib.delayed(_consider_set)(fitter, effects) for effects in sets)
-    return [fit for fit in progress(parallel(tasks), len(sets)) if fit is not None]
+    tasks = [joblib.delayed(_consider_set)(fitter, effects) for effects in sets]
+    return [fit for fit in progress(_in_parallel(tasks, jobs), len(sets)) if fit is not None]

@@ -217,7 +217,7 @@ class Creep(MaterialEffect):
     parameters = (
         Parameter('c', '% of l0', 'strain per factor e of time after a full transformation', 0.01,
                   0.5, 0.0, (0.03, 0.15), log=True),
-        Parameter('t0', 's', 'time from which the logarithm counts', 0.02, 100.0, 3.0, (3.0,),
+        Parameter('t0', 's', 'time from which the logarithm counts', 0.005, 300.0, 3.0, (3.0,),
                   log=True),
         Parameter('kept', '1', '0: a step ends the creep of the one before, as in a transformation;'
                   ' 1: it goes on, as in a polymer', 0.0, 1.0, 0.0, (0.0, 1.0),
