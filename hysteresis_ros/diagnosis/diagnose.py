@@ -27,7 +27,7 @@ PRACTICAL = 0.05
 CONSISTENT = 0.55
 MOST_EFFECTS = 3
 # First effects from which sets are grown.
-MOST_SEEDS = 3
+MOST_SEEDS = 2
 # Effects of which all sets are tried on the bench.
 MOST_IN_SETS = 5
 # Effects of which all pairs are tried on the arm.
@@ -245,7 +245,7 @@ class _Diagnostician:
             chosen = _simplest(plausible or (rivals if fit.implausible() else []))
             if not chosen:
                 break
-            fit = chosen[0].fit
+            fit = self._refit(chosen[0].fit.effects)
         return None if fit.implausible() else fit
 
     def _pairs(self, first, grown):

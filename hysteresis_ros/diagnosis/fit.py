@@ -169,10 +169,11 @@ class Fitter:
             # What the bench says of it is as good a start as any.
             starts.append(effect)
         starts.sort(key=error)
-        fits = [self.fit(fixed, [*known, start], rows, FIRST_EVALUATIONS)
-                for start in starts[:FOLLOWED_STARTS]]
+        # Beside others only the best is fitted to the end, by whoever chooses it.
+        followed = starts[:1] if known else starts[:FOLLOWED_STARTS]
+        fits = [self.fit(fixed, [*known, start], rows, FIRST_EVALUATIONS) for start in followed]
         best = min(fits, key=lambda fit: self.error(fit.predicted, mask))
-        return best if best.converged else self.fit(fixed, best.effects, rows)
+        return best if best.converged or known else self.fit(fixed, best.effects, rows)
 
     def error(self, predicted, rows=slice(None)) -> float:
         """Root mean square error of some rows."""

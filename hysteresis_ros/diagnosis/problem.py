@@ -23,7 +23,7 @@ from hysteresis_ros.operators import Preisach, cell_areas
 
 # A long recording is judged on about this many rows; between them nothing new is learned. Weights
 # that are refitted again and again ask for fewer.
-MOST_ROWS = {'arm': 1000, 'bench': 400}
+MOST_ROWS = {'arm': 800, 'bench': 400}
 MOST_FOLDS = 4
 # Blocks for significance: about this many a recording.
 BLOCKS = 24
