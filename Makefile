@@ -97,7 +97,7 @@ benchmark: build
 	@$(IN_WORKSPACE) $(VENV)/bin/python -m benchmark benchmark.json
 
 hidden: build
-	@$(IN_WORKSPACE) $(VENV)/bin/python tools/hidden.py hidden.json $(HIDDEN_ARGS)
+	@$(IN_WORKSPACE) $(VENV)/bin/python tools/hidden.py --page docs/results.md $(HIDDEN_ARGS) hidden.json
 
 clean:
 	rm -rf .venv* .workspace* build install log dist demo *.egg-info

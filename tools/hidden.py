@@ -21,6 +21,8 @@ import numpy as np
 # Seeds above this were never looked at while thresholds were chosen.
 FIRST_SEED = 1000
 STRENGTHS = {'strong': 1.0, 'weak': 0.4}
+# Between these a page holds the tables.
+MARKS = '<!-- hidden effects: begin -->', '<!-- hidden effects: end -->'
 # Effects that only transients can show are hidden in continuous recordings, others in settled ones.
 TRANSIENT = {'thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'creep',
              'viscous_friction', 'inertia', 'latency', 'ambient_drift', 'fatigue'}
@@ -102,32 +104,66 @@ def run(case, model):
 
 
 def score(results):
-    """Return the scores that are asked for, each with the number of cases."""
+    """Return for each score what was reached, how many cases it rests on, and what is asked."""
     def share(group, good):
         chosen = [row for row in results if row['group'] == group]
         return (100.0 * sum(map(good, chosen)) / len(chosen) if chosen else None), len(chosen)
 
-    scores = {}
-    for group in ('strong', 'weak'):
-        scores[f'truth in the reported set, {group} [%]'] = share(
-            group, lambda row: row['truth'][0] in row['reported'])
-    scores['truth named first, strong [%]'] = share(
-        'strong', lambda row: row['missing'][:1] == row['truth'])
-    sizes = [len(row['reported']) for row in results
-             if row['group'] in ('strong', 'weak') and row['reported']]
-    scores['mean size of the reported set'] = (float(np.mean(sizes)) if sizes else None,
-                                               len(sizes))
-    scores['false alarm when nothing is hidden [%]'] = share(
-        'none', lambda row: row['verdict'] in ('missing', 'unknown'))
-    scores['unknown when in no catalogue [%]'] = share(
-        'unknown', lambda row: row['verdict'] == 'unknown')
-    scores['both of a pair found [%]'] = share(
-        'pair', lambda row: set(row['truth']) <= set(row['reported']))
-    ratios = [row['unseen'] / row['clean'] for row in results if 'unseen' in row
-              and row['truth'][0] in row['missing']]
-    scores['error on the unseen recording over that without effect, median'] = (
-        float(np.median(ratios)) if ratios else None, len(ratios))
-    return scores
+    def inside(row):
+        return row['truth'][0] in row['reported']
+
+    single = [row for row in results if row['group'] in ('strong', 'weak')]
+    sizes = [len(row['reported']) for row in single if row['reported']]
+    ratios = [row['unseen'] / row['clean'] for row in single
+              if 'unseen' in row and row['truth'][0] in row['missing']]
+    return {
+        'truth in the reported set, strong [%]': (*share('strong', inside), 'at least 95'),
+        'truth in the reported set, weak [%]': (*share('weak', inside), 'at least 85'),
+        'truth named first, strong [%]': (
+            *share('strong', lambda row: row['missing'][:1] == row['truth']), 'at least 85'),
+        'mean size of the reported set': (
+            float(np.mean(sizes)) if sizes else None, len(sizes), 'at most 2.5'),
+        'false alarm when nothing is hidden [%]': (
+            *share('none', lambda row: row['verdict'] in ('missing', 'unknown')), 'at most 5'),
+        'unknown when in no catalogue [%]': (
+            *share('unknown', lambda row: row['verdict'] == 'unknown'), 'at least 80'),
+        'both of a pair found [%]': (
+            *share('pair', lambda row: set(row['truth']) <= set(row['reported'])), 'at least 75'),
+        'error on the unseen recording over that without effect, median': (
+            float(np.median(ratios)) if ratios else None, len(ratios), 'at most 1.3'),
+        'the same, share of cases within 1.3 [%]': (
+            100.0 * float(np.mean(np.array(ratios) <= 1.3)) if ratios else None, len(ratios), '')}
+
+
+def to_markdown(results):
+    """Return the scores, and a line for each effect, as two tables."""
+    lines = ['| score | asked | reached | cases |', '|---|---|---|---|']
+    for name, (value, count, asked) in score(results).items():
+        lines.append(f'| {name} | {asked} | {"-" if value is None else f"{value:.3g}"} | {count} |')
+    lines += ['', '| hidden | strong: named first | strong: in the set | weak: in the set | '
+              'unseen error over clean |', '|---|---|---|---|---|']
+    for name in sorted({row['truth'][0] for row in results if row['group'] in STRENGTHS}):
+        cells = []
+        for group, good in (('strong', lambda row: row['missing'][:1] == [name]),
+                            ('strong', lambda row: name in row['reported']),
+                            ('weak', lambda row: name in row['reported'])):
+            chosen = [row for row in results if row['group'] == group and row['truth'] == [name]]
+            cells.append(f'{sum(map(good, chosen))} of {len(chosen)}')
+        ratios = [row['unseen'] / row['clean'] for row in results
+                  if row['group'] in STRENGTHS and row['truth'] == [name] and 'unseen' in row
+                  and name in row['missing']]
+        cells.append(f'{np.median(ratios):.2f}' if ratios else '-')
+        lines.append(f'| `{name}` | ' + ' | '.join(cells) + ' |')
+    return '\n'.join(lines) + '\n'
+
+
+def write_page(results, path):
+    """Put the tables between the marks of a page."""
+    page = Path(path)
+    before, rest = page.read_text(encoding='utf-8').split(MARKS[0])
+    _, after = rest.split(MARKS[1])
+    page.write_text(f'{before}{MARKS[0]}\n{to_markdown(results)}{MARKS[1]}{after}',
+                    encoding='utf-8')
 
 
 def main():
@@ -141,8 +177,13 @@ def main():
     parser.add_argument('--paper-model', action='store_true',
                         help='identify without effects of the material')
     parser.add_argument('--jobs', type=int, default=-1)
+    parser.add_argument('--page', help='put the tables into this page, between its marks')
+    parser.add_argument('--render', metavar='FILE', help='only the page, from an earlier output')
     parser.add_argument('output', nargs='?', default='hidden.json', help='scores and cases')
     args = parser.parse_args()
+    if args.render:
+        results = json.loads(Path(args.render).read_text(encoding='utf-8'))['cases']
+        return write_page(results, args.page) if args.page else print(to_markdown(results))
     chosen = cases(args.seeds, args.others, args.quick)
     if args.first_seed is not None:
         chosen = [(group, protocol, effects, seed - FIRST_SEED + args.first_seed)
@@ -164,14 +205,17 @@ def main():
               f'{row["rmse_before"]:.4f} -> {row["rmse_after"]:.4f} ({row["structure"]:.4f}) '
               f'{row["top"]} {row["seconds"]:.0f} s', file=sys.stderr, flush=True)
         write(results, args.output)
-    for name, (value, count) in score(results).items():
+    for name, (value, count, asked) in score(results).items():
         text = 'no case' if value is None else f'{value:.4g}'
-        print(f'{name:64s} {text:>8s}   ({count} cases)')
+        print(f'{name:64s} {text:>8s}   ({count} cases; asked: {asked})')
+    if args.page:
+        write_page(results, args.page)
+    return None
 
 
 def write(results, path):
     """Write scores and cases; what is there when the grid is interrupted counts."""
-    scores = {name: value for name, (value, _) in score(results).items()}
+    scores = {name: value for name, (value, *_) in score(results).items()}
     Path(path).write_text(json.dumps({'scores': scores, 'cases': results}, indent=1) + '\n',
                           encoding='utf-8')
 
