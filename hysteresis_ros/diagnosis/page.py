@@ -37,6 +37,11 @@ img { max-width: 100%; height: auto; display: block; }
 figcaption { font-size: .88rem; color: #48535f; margin-top: .2rem; }
 details { margin: .6rem 0; } summary { cursor: pointer; }
 footer { margin-top: 2.5rem; color: #5a6672; font-size: .85rem; }
+@media screen and (max-width: 40rem) {
+  /* A picture is read by moving it sideways, like a table, not with a magnifying glass. */
+  figure { overflow-x: auto; } img { max-width: none; width: 44rem; }
+  figcaption { position: sticky; left: 0; width: calc(100vw - 2rem); }
+  td { white-space: nowrap; } }
 @media print { body { max-width: none; padding: 0; font-size: 10.5pt; }
   h2 { break-after: avoid; } .verdict, .warning, tr.strong td { background: none; }
   .scroll { overflow: visible; } tr { break-inside: avoid; } }
