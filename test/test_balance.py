@@ -238,6 +238,21 @@ def test_motion_is_that_of_the_equation_of_motion(
     assert np.max(np.abs(seen - true(time)[0])) < tolerance * stroke
 
 
+@pytest.mark.parametrize('start, x, side', [(4.0, 8.0, -1.0), (8.0, 4.0, 1.0)])
+def test_dry_friction_is_against_the_motion(start, x, side):
+    """Creeping along, the muscle holds the moment less or more the friction's."""
+    made = reversible_balance(coulomb_friction={'tau_c': 0.04}, viscous_friction={'b': 0.5})
+    made.settle(start)
+    made.step(start, 30.0)
+    angles = [made.step(x, 0.005) for _ in range(12)]
+    speed = (1.5 * angles[-1] - 2.0 * angles[-2] + 0.5 * angles[-3]) / 0.005
+    theta, force = angles[-1], made.operators[0].input + x
+    assert speed * side > 0.05
+    held = 3.0 * force * GEOMETRY.moment_arm(theta)
+    assert held == pytest.approx(
+        GEOMETRY.load_moment(theta) - 0.5 * speed - side * 0.04, abs=2e-4)
+
+
 def test_the_pull_that_leaves_the_muscle_loose_does_so():
     made = reversible_balance(inertia={'I': 0.05, 'b': 0.02})
     made.settle(4.0)

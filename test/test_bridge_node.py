@@ -172,7 +172,7 @@ def test_starts_disabled_where_that_is_wanted(bridge, graph):
 
 def test_initialise_heats_and_cools(bridge, graph):
     """It takes as long as it needs, in board time; setpoints are refused meanwhile."""
-    one = bridge('sim://bicep?speed=30', initialise_heat_time=20.0, initialise_cool_time=30.0)
+    one = bridge('sim://bicep?speed=30', initialise_heat_time=60.0, initialise_cool_time=30.0)
     one.hold(3.5, lambda: one.joints and one.joints[-1].position[0] < 2.4, 'a history')
     client = graph.probe.create_client(Trigger, '/hardware_bridge/initialise')
     graph.until(client.service_is_ready, 'the service')
@@ -191,7 +191,7 @@ def test_initialise_heats_and_cools(bridge, graph):
     seen = [round(voltage.data) for voltage in one.voltages[begin:]]
     assert set(seen) == {0, 6}
     heating = seen.index(0)
-    assert 36 <= heating <= 60 and set(seen[heating:]) == {0}
+    assert 110 <= heating <= 150 and set(seen[heating:]) == {0}
     assert any('heat and cool cycle: heating' in status.message for status in one.statuses)
     one.hold(2.0, lambda: one.last() == pytest.approx(2.0, abs=0.02), 'setpoints to count again')
 

@@ -212,3 +212,23 @@ def test_each_chain_has_a_memory_of_its_own_that_can_be_saved():
         Chain([], WIRE).restore(saved)
     with pytest.raises(KeyError):
         one.restore([{}])
+
+
+@pytest.mark.parametrize('name, values', [
+    ('thermal_lag', {'time_constant': 3.0}),
+    ('heating_cooling_asymmetry', {'time_constant': 3.0, 'ratio': 1.7}),
+    ('latent_heat', {'time_constant': 2.0, 'latent': 0.4})])
+def test_a_whole_trial_is_the_same_as_step_by_step(name, values):
+    chance = np.random.default_rng(4)
+    heat, steps, phases = (chance.uniform(low, high, 40) for low, high in (
+        (0.0, 36.0), (0.1, 4.0), (0.0, 1.0)))
+    made = effect(name, **values)
+    rows = made.forward(heat, ROOM._replace(step=steps, phase=phases), WIRE)
+    made.start()
+    single = [made.step(*row, WIRE) for row in zip(heat.tolist(), steps.tolist(), phases.tolist())]
+    np.testing.assert_allclose(rows, single, rtol=1e-12)
+    # Turning to martensite gives heat off.
+    if name == 'latent_heat':
+        warmer = made.forward(np.zeros(2), ROOM._replace(
+            step=np.full(2, 1.0), phase=np.array([0.2, 0.7])), WIRE)
+        assert warmer[1] == pytest.approx(0.4 * 0.5 * WIRE.heat)

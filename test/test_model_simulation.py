@@ -118,6 +118,22 @@ def test_stride_is_exact_in_the_rows_it_visits(names):
     np.testing.assert_allclose(strided[rows], full[rows], rtol=0.0, atol=exact)
 
 
+def test_judged_rows_are_exact_in_every_trial_and_at_the_ends_of_ramps():
+    """Rows are counted from the start of the table, wherever a trial begins."""
+    model = bicep_model()
+    ramp = np.concatenate((np.linspace(0.5, 5.5, 23), np.full(14, 5.5), np.linspace(5.5, 1.5, 19),
+                           np.full(31, 1.5)))
+    count = len(ramp)
+    run = Measurement.from_columns({
+        'time': np.tile(0.1 * np.arange(1, count + 1), 3), 'trial': np.repeat(np.arange(3.0), count),
+        'voltage': np.tile(ramp, 3), 'angle': np.ones(3 * count)})
+    full = Simulator(model, run).run([])
+    strided = Simulator(model, run, stride=10).run([])
+    np.testing.assert_allclose(strided[::10], full[::10], rtol=0.0, atol=1e-9)
+    # A straight line over the end of a ramp would be off by degrees.
+    assert np.degrees(np.max(np.abs(strided - full))) < 1.0
+
+
 @pytest.mark.parametrize('name', [name for name in WITH_TIME if name != 'latency'])
 def test_stride_comes_close_where_time_counts(name):
     model = bicep_model([name])

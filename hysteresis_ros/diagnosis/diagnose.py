@@ -305,8 +305,6 @@ class _Diagnostician:
 
     def _worth_another_look(self, first, fit):
         """Effects that have anything to say about what is left, judged by their signatures."""
-        if self.problem.refits:
-            return [candidate.id for candidate in first]
         left = self.problem.measured - fit.predicted
         limit = (1.0 - PRACTICAL) * float(np.mean(left ** 2))
         worth = {}

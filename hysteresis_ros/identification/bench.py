@@ -139,8 +139,8 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     if force is not None and length is not None and force.drive != length.drive:
         raise IdentificationError(f'the force table is driven by {force.drive}, the length table '
                                   f'by {length.drive}; they have to be of one muscle')
-    if min(levels) < 1:
-        raise IdentificationError(f'levels must be positive, not {levels}')
+    if len(levels) != 2 or min(levels) < 1:
+        raise IdentificationError(f'levels must be two positive numbers, not {levels}')
     kind = 'preisach' if operator in ('two-stage', 'preisach') else operator
     some = length if length is not None else force
     recipe = Recipe(kind, anchored, plain)
@@ -164,7 +164,7 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     model.linear = fit_linear(
         length and length.where(choose_trials(length, length_trials, 'length')),
         force and force.where(choose_trials(force, force_trials, 'force')))
-    measure(model, force, force_trials, length, length_trials)
+    model.metrics = measure(model, force, force_trials, length, length_trials)
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit)
 
@@ -249,17 +249,23 @@ def _first_stage_from_lengths(model, length, rows, levels):
 
 def measure(model, force, force_trials, length, length_trials):
     """
-    Fill in the model's metrics: errors on fitted and on other trials, of both methods.
+    Return the model's metrics: errors on fitted and on other trials, of both methods.
 
     Parameters
     ----------
     model : MuscleModel
-        Whose `metrics` are changed.
+        With effects or without.
     force, length : Measurement or None
         The bench tables.
     force_trials, length_trials : sequence of numbers or None
         Trials that were fitted.
+
+    Returns
+    -------
+    dict
+        By 'force' and 'length', as far as there is a table.
     """
+    metrics = {}
     for name, measurement, trials in (('force', force, force_trials),
                                       ('length', length, length_trials)):
         if measurement is None:
@@ -277,7 +283,8 @@ def measure(model, force, force_trials, length, length_trials):
                     for label, method in (('model', 'preisach'), ('linear', 'linear'))}
                 entry[part]['rmse'] = entry[part]['model']['rmse']
                 entry[part]['rows'] = int(np.count_nonzero(chosen))
-        model.metrics[name] = entry
+        metrics[name] = entry
+    return metrics
 
 
 def _provenance(force, force_trials, length, length_trials):

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects that belong to the bench model: found in its own tables, or named by the user."""
 
+import dataclasses
+
 import numpy as np
 
 from hysteresis_ros.diagnosis.diagnose import PRACTICAL, diagnose
@@ -60,9 +62,9 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
     if not names:
         return model, []
     extension = extend(model, names, [fitted])
-    extended = extension.model
-    measure(extended, force, force_trials, length, length_trials)
-    return extended, extension.added
+    metrics = measure(extension.model, force, force_trials, length, length_trials)
+    metrics = {**extension.model.metrics, **metrics}
+    return dataclasses.replace(extension.model, metrics=metrics), extension.added
 
 
 def _with_universal(model, found, fitted):

@@ -1,0 +1,105 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Bench tables that are sampled in time: no voltage has to drive them, and no arm is there."""
+
+import numpy as np
+import pytest
+
+from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.diagnosis import diagnose as diagnosis
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.identification.effects import add_effects
+from hysteresis_ros.laboratory.linkage import GEOMETRY
+from hysteresis_ros.laboratory.protocols import protocol_tables
+from hysteresis_ros.measurements import Measurement
+
+ROWS, STEP = 120, 2.0
+
+
+def table(respond):
+    """Return four trials of a drive that wanders, with what `respond` makes of it."""
+    drive, length = [], []
+    for trial in range(4):
+        chance = np.random.default_rng(trial)
+        turns = np.sort(chance.choice(np.arange(10, ROWS - 10), 8, replace=False))
+        drive.append(np.interp(np.arange(ROWS), [0, *turns, ROWS - 1],
+                               [0.0, *chance.uniform(0.0, 1.0, 9)]))
+        length.append(respond(drive[-1]))
+    return Measurement.from_columns({
+        'time': np.tile(STEP * np.arange(1, ROWS + 1), 4), 'trial': np.repeat(np.arange(4.0), ROWS),
+        'pressure': 1e5 * np.concatenate(drive), 'length': 0.02 * np.concatenate(length)})
+
+
+def play(drive, radius):
+    """Return the play operator's output."""
+    played, state = [], 0.0
+    for value in drive:
+        state = min(max(state, value - radius), value + radius)
+        played.append(state)
+    return np.array(played)
+
+
+def muscle(drive):
+    """Return a loop that a Preisach operator has."""
+    return sum(play(drive, radius) for radius in (0.02, 0.08, 0.15)) / 3.0
+
+
+def damper(drive):
+    """Return what rubs: a force ahead of the way, which no weights of one sign give."""
+    force = [0.0]
+    for change in np.diff(drive):
+        side = np.sign(change)
+        force.append(side + (force[-1] - side) * np.exp(-8.0 * abs(change)))
+    return 0.3 * drive + 0.5 * np.array(force)
+
+
+def lagging(drive):
+    """Return the muscle behind a lag of 8 s."""
+    felt, state = [], 0.0
+    for value in drive:
+        state = value + (state - value) * np.exp(-STEP / 8.0)
+        felt.append(state)
+    return muscle(np.array(felt))
+
+
+def found_in(measurement, monkeypatch, names=('thermal_lag', 'fatigue', 'latency')):
+    """Diagnose a table with the model of its own Preisach operator."""
+    possible = diagnosis.possible
+    monkeypatch.setattr(diagnosis, 'possible', lambda problem, known: (
+        [name for name in possible(problem, known)[0] if name in names], {}))
+    model = identify(measurement, operator='preisach', levels=(12, 12)).model
+    return diagnose(model, [measurement], seed=1)
+
+
+def test_a_friction_damper_is_no_muscle_of_the_catalogue(monkeypatch):
+    """No weights of one sign give its loop, and no effect mends that."""
+    found = found_in(table(damper), monkeypatch)
+    assert (found.verdict, found.missing) == ('unknown', [])
+
+
+def test_a_loop_that_weights_can_give_is_adequate(monkeypatch):
+    """The same table with a loop the right way round."""
+    found = found_in(table(muscle), monkeypatch)
+    assert (found.verdict, found.missing) == ('adequate', [])
+
+
+def test_a_lag_shows_without_an_arm(monkeypatch):
+    """With the time constant that it has."""
+    found = found_in(table(lagging), monkeypatch)
+    assert found.missing == ['thermal_lag']
+    assert found.effects[0].values['time_constant'] == pytest.approx(8.0, rel=0.15)
+
+
+def test_the_elasticity_of_the_wire_is_added_to_what_the_bench_proves():
+    """Constant loads cannot prove it; on an arm it is needed."""
+    tables = protocol_tables('bench', {}, 3)
+    force, length = (Measurement.from_columns(tables[name]) for name in
+                     ('force.csv', 'length.csv'))
+    trials = {'length_trials': range(4), 'force_trials': [0]}
+    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
+    extended, added = add_effects(model, length, force, **trials)
+    assert {effect.id for effect in added} == {
+        'stress_dependence', 'stress_dependent_strain', 'series_compliance'}
+    before, after = (one.metrics['length']['verification']['rmse'] for one in (model, extended))
+    assert after < 0.5 * before
