@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
-from hysteresis_ros.diagnosis import diagnose as diagnosis
+from hysteresis_ros.diagnosis import search
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.identification.effects import add_effects
@@ -65,8 +65,8 @@ def lagging(drive):
 
 def found_in(measurement, monkeypatch, names=('thermal_lag', 'fatigue', 'latency')):
     """Diagnose a table with the model of its own Preisach operator."""
-    possible = diagnosis.possible
-    monkeypatch.setattr(diagnosis, 'possible', lambda problem, known: (
+    possible = search.possible
+    monkeypatch.setattr(search, 'possible', lambda problem, known: (
         [name for name in possible(problem, known)[0] if name in names], {}))
     model = identify(measurement, operator='preisach', levels=(12, 12)).model
     return diagnose(model, [measurement], seed=1)

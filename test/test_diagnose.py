@@ -11,8 +11,8 @@ import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.cli.diagnose import to_text
-from hysteresis_ros.diagnosis import diagnose as diagnosis
-from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis import search
+from hysteresis_ros.diagnosis.diagnose import Diagnosis, diagnose
 from hysteresis_ros.diagnosis.extend import extend, rmse
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
@@ -37,8 +37,9 @@ def model():
     trials = {'length_trials': range(4), 'force_trials': [0]}
     base = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
     found, added = add_effects(base, length, force,
-                               ['stress_dependence', 'stress_dependent_strain'], **trials)
-    assert len(added) == 2
+                               ['stress_dependence', 'stress_dependent_strain',
+                                'series_compliance'], **trials)
+    assert len(added) == 3
     return found
 
 
@@ -119,13 +120,13 @@ def test_effects_of_sensor_and_mechanism_are_in_the_reported_set(model, name):
 
 def test_a_lag_shows_in_transients(model, monkeypatch):
     """In a continuous recording, among what could be mistaken for it."""
-    possible = diagnosis.possible
+    possible = search.possible
 
     def fewer(problem, known):
         names, hopeless = possible(problem, known)
         assert known or set(RIVALS) <= set(names)
         return [name for name in names if name in RIVALS], hopeless
-    monkeypatch.setattr(diagnosis, 'possible', fewer)
+    monkeypatch.setattr(search, 'possible', fewer)
     train, _ = recordings({'thermal_lag': 1.0}, 'arm-dynamic', every=5)
     assert not train.settled
     found = diagnose(model, [train], seed=SEED)
@@ -148,8 +149,8 @@ def test_what_no_catalogue_has_is_called_unknown(model):
 
 def test_something_that_happened_once_is_told_by_its_time(model, monkeypatch):
     """A crimp that slips looks like a drift or like fatigue to whoever needs a name."""
-    possible = diagnosis.possible
-    monkeypatch.setattr(diagnosis, 'possible', lambda problem, known: (
+    possible = search.possible
+    monkeypatch.setattr(search, 'possible', lambda problem, known: (
         ['ambient_drift', 'fatigue', 'slack', 'payload_error'], possible(problem, known)[1]))
     train, _ = recordings({'unlisted_slipping_crimp': 1.0}, trials=(0, 1, 2, 3))
     found = diagnose(model, [train], seed=SEED)
@@ -160,8 +161,8 @@ def test_something_that_happened_once_is_told_by_its_time(model, monkeypatch):
 
 def test_two_effects_behind_one_that_stands_in_for_both_are_found_as_a_pair(model, monkeypatch):
     """A dead zone and a sag look like a load that counts more."""
-    possible = diagnosis.possible
-    monkeypatch.setattr(diagnosis, 'possible', lambda problem, known: (
+    possible = search.possible
+    monkeypatch.setattr(search, 'possible', lambda problem, known: (
         [name for name in ('stress_dependence', 'supply_sag', 'pwm_dead_zone')
          if name in possible(problem, known)[0]], {}))
     train, _ = recordings({'supply_sag': 1.0, 'pwm_dead_zone': 1.0}, trials=(0, 1, 2, 3))
@@ -187,11 +188,11 @@ def test_effects_that_a_resting_arm_cannot_show_are_not_called_absent(model):
 
 def test_the_same_recording_gives_the_same_verdict_whatever_the_jobs(model, monkeypatch):
     """Random draws are seeded, and workers return what the process itself would."""
-    possible = diagnosis.possible
-    monkeypatch.setattr(diagnosis, 'possible', lambda problem, known: (
+    possible = search.possible
+    monkeypatch.setattr(search, 'possible', lambda problem, known: (
         ['payload_error', 'encoder_offset'], possible(problem, known)[1]))
     train, _ = recordings({'payload_error': 1.0})
     one, two = (diagnose(model, [train], jobs=jobs, seed=3).to_json() for jobs in (1, 2))
     assert one == two
-    assert set(one) >= {field.name for field in dataclasses.fields(diagnosis.Diagnosis)} - {
+    assert set(one) >= {field.name for field in dataclasses.fields(Diagnosis)} - {
         'effects'}

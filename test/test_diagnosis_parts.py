@@ -81,17 +81,6 @@ def test_vectors_of_two_effects_stay_apart():
     assert second.values['offset'] == pytest.approx(0.5 * effects[1].values['offset'])
 
 
-def test_an_end_of_the_range_is_noticed_for_the_effect_that_meets_it():
-    """An estimate at a bound stands in for something else."""
-    model = bicep_model()
-    parameters = ParameterVector(
-        [effect_of(model, 'payload_error'), effect_of(model, 'encoder_offset')], 'arm')
-    vector = parameters.vector()
-    assert parameters.at_bound(vector) == [False, False]
-    vector[1] = parameters.upper[1]
-    assert parameters.at_bound(vector) == [False, True]
-
-
 def test_intervals_are_given_in_the_unit_of_the_parameter():
     """A logarithmic component has an interval by a factor."""
     parameters = ParameterVector([effect_of(bicep_model(), 'thermal_lag')], 'arm')

@@ -25,7 +25,8 @@ def add_parser(subparsers):
     parser.add_argument('--levels', nargs=2, type=int, default=(10, 20), metavar=('N1', 'N2'),
                         help='levels of H1 and H2 (default: 10 20)')
     parser.add_argument('--operator', choices=OPERATORS,
-                        help='default: two-stage where there is a load, else preisach')
+                        help='default: two-stage with a force table, preisach without a load, '
+                        'else what predicts held-out trials better')
     parser.add_argument('--effects', default='none', metavar='none|auto|A,B',
                         help="effects of the catalogue to add: none (default, the paper's model), "
                         'those that the tables prove (auto), or those named')

@@ -9,7 +9,8 @@ import math
 import joblib
 import numpy as np
 
-from hysteresis_ros.diagnosis.fit import Fit
+from hysteresis_ros.diagnosis.fit import (
+    ESTIMATE_SLACK, FIRST_EVALUATIONS, Fit, MOST_EVALUATIONS)
 from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue
 
@@ -129,7 +130,7 @@ def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
     before = fitter.error(current.held_out)
     after = fitter.error(fit.held_out)
     return Candidate(name, fit, fit.predicted - current.predicted, after,
-                     before ** 2 - after ** 2, implausible=fit.effects[-1].implausible())
+                     before ** 2 - after ** 2, implausible=fit.effects[-1].implausible(ESTIMATE_SLACK))
 
 
 def _in_parallel(tasks, jobs):
@@ -152,7 +153,7 @@ def consider_all(fitter, known, current: Fit, names, jobs: int, progress) -> lis
     return sorted(found, key=lambda candidate: candidate.rmse)
 
 
-def _consider_set(fitter, effects) -> Fit | None:
+def _try_set(fitter, effects, evaluations=MOST_EVALUATIONS) -> Fit | None:
     """Fit some effects together, from usual values and from those that each had alone."""
     problem = fitter.problem
     usual = []
@@ -163,11 +164,21 @@ def _consider_set(fitter, effects) -> Fit | None:
             parameter.name: effect.values[parameter.name]
             for parameter in effect.parameters if parameter.choices}))
     with np.errstate(all='ignore'):
-        fits = [fitter.fit(problem.model.effects, start) for start in (usual, effects)]
-        best = min(fits, key=lambda fit: fitter.error(fit.predicted))
-        best = fitter.cross_validate(problem.model.effects, best)
-    finite = np.all(np.isfinite(best.held_out)) and np.all(np.isfinite(best.jacobian))
+        fits = [fitter.fit(problem.model.effects, start, evaluations=evaluations)
+                for start in (usual, effects)]
+    best = min(fits, key=lambda fit: fitter.error(fit.predicted))
+    finite = np.all(np.isfinite(best.predicted)) and np.all(np.isfinite(best.jacobian))
     return best if finite else None
+
+
+def _consider_set(fitter, effects) -> Fit | None:
+    """Fit some effects together and cross-validate them."""
+    fit = _try_set(fitter, effects)
+    if fit is None:
+        return None
+    with np.errstate(all='ignore'):
+        fit = fitter.cross_validate(fitter.problem.model.effects, fit)
+    return fit if np.all(np.isfinite(fit.held_out)) else None
 
 
 def subsets(effects, most: int) -> list[list]:
@@ -180,4 +191,10 @@ def subsets(effects, most: int) -> list[list]:
 def consider_sets(fitter, sets, jobs: int, progress) -> list[Fit]:
     """Fit and cross-validate sets of effects, in parallel."""
     tasks = [joblib.delayed(_consider_set)(fitter, effects) for effects in sets]
+    return [fit for fit in progress(_in_parallel(tasks, jobs), len(sets)) if fit is not None]
+
+
+def try_sets(fitter, sets, jobs: int, progress) -> list[Fit]:
+    """Fit sets of effects for a few steps, to see which are worth more; in parallel."""
+    tasks = [joblib.delayed(_try_set)(fitter, effects, FIRST_EVALUATIONS) for effects in sets]
     return [fit for fit in progress(_in_parallel(tasks, jobs), len(sets)) if fit is not None]

@@ -60,14 +60,6 @@ class ParameterVector:
                 _from_unit(parameter, float(low)), _from_unit(parameter, float(high)))
         return effects
 
-    def at_bound(self, vector) -> list[bool]:
-        """Say for each effect whether a component (k,) has run into the end of its range."""
-        margin = 0.01 * (self.upper - self.lower)
-        touching = (vector <= self.lower + margin) & (self.lower != 0.0)
-        touching |= vector >= self.upper - margin
-        return [any(touching[k] for k, (index, _) in enumerate(self.entries) if index == number)
-                for number in range(len(self.effects))]
-
 
 def _unit(parameter) -> float:
     return max(parameter.high if parameter.both_signs else parameter.high - parameter.low, 1e-12)

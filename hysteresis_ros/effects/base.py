@@ -77,12 +77,12 @@ class Parameter:
         margin = 0.5 * (self.high - self.low)
         return min(self.low - margin, self.neutral), self.high + margin
 
-    def plausible(self, value: float) -> bool:
-        """Whether `value` lies in the physical range."""
+    def plausible(self, value: float, slack: float = 0.0) -> bool:
+        """Whether `value` lies in the physical range, or beyond its ends by a share `slack`."""
         if self.choices:
             return value in self.choices
         size = abs(value) if self.both_signs else value
-        return self.low <= size <= self.high
+        return self.low / (1.0 + slack) <= size <= self.high * (1.0 + slack)
 
 
 class Inputs(NamedTuple):
@@ -231,11 +231,11 @@ class Effect(abc.ABC):
         copy.parameters = self.parameters
         return copy
 
-    def implausible(self) -> list[str]:
-        """Name the parameters that lie outside their physical range; neutral ones are not used."""
+    def implausible(self, slack: float = 0.0) -> list[str]:
+        """Name the parameters outside their physical range (see `Parameter`), if in use."""
         return [parameter.name for parameter in self.parameters
                 if self.values[parameter.name] != parameter.neutral
-                and not parameter.plausible(self.values[parameter.name])]
+                and not parameter.plausible(self.values[parameter.name], slack)]
 
     def to_dict(self) -> dict:
         """Return plain types for the model file."""

@@ -226,7 +226,7 @@ class Creep(MaterialEffect):
     memory = ('_since', '_drive', '_phase', '_before', '_direction', '_modes')
 
     # The logarithm as a sum of relaxations, each this many times slower than the one before.
-    MODES, RATIO = 10, 3.0
+    MODES, RATIO = 6, 3.0
 
     # A change of the drive by less than this share of its range is a hold.
     HOLD = 1e-3

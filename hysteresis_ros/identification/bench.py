@@ -113,8 +113,9 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     levels : (int, int)
         N1 and N2.
     operator : {'two-stage', 'preisach', 'play', 'bouc-wen', 'linear'}, optional
-        Default 'two-stage' with a load, else 'preisach'. 'preisach' is one operator of the drive;
-        the others are the two-stage cascade made of such operators.
+        'preisach' is one operator of the drive; the others are the two-stage cascade made of such
+        operators. Default 'two-stage' with a force table, 'preisach' without a load; with a load
+        but without a force table what predicts trials better that were held out.
     anchored : bool
         Whether H1(0) is tied to the first force of the cold muscle and H2(0) to zero.
     plain : bool
@@ -132,6 +133,10 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     if length is None and force is None:
         raise IdentificationError('nothing to identify; give a length table, a force table or both')
     loaded = length is not None and length.load is not None
+    if operator is None and loaded and force is None:
+        options = {'length_trials': length_trials, 'geometry': geometry, 'levels': levels,
+                   'anchored': anchored, 'plain': plain}
+        return _better_of(length, ('two-stage', 'preisach'), options)
     operator = operator or ('two-stage' if loaded or length is None else 'preisach')
     if operator not in OPERATORS:
         raise IdentificationError(
@@ -167,6 +172,24 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     model.metrics = measure(model, force, force_trials, length, length_trials)
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit)
+
+
+def _better_of(length, operators, options):
+    """Identify with each operator and return what is best on held-out trials."""
+    found, problem = [], None
+    for operator in operators:
+        try:
+            found.append(identify(length, operator=operator, **options))
+        except IdentificationError as error:
+            problem = error
+    if not found:
+        raise problem
+
+    def held_out(one):
+        # The paper's plain problem holds nothing out.
+        fit = one.length_fit
+        return fit.validation.min() if len(fit.validation) else fit.rmse
+    return min(found, key=held_out)
 
 
 def _set_ranges(model, length, force):

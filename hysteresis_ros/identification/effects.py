@@ -6,7 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from hysteresis_ros.diagnosis.diagnose import PRACTICAL, diagnose
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.evidence import PRACTICAL
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.fit import Fitter
 from hysteresis_ros.diagnosis.parameters import starts_of

@@ -1,0 +1,270 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Search the catalogue for the smallest set of effects that explains a recording.
+
+Every effect is fitted by itself. On an arm sets are then grown: the best effect, and what explains
+more beside it. Because one effect can stand in for two that are not like it, pairs are fitted as
+well where a grown set leaves more than the base model's own error. A straight extrapolation says
+in which order. On bench tables all sets of the best few effects are fitted.
+"""
+
+import itertools
+
+import numpy as np
+
+from hysteresis_ros.diagnosis import significance
+from hysteresis_ros.diagnosis.candidates import (
+    consider_all, consider_sets, possible, present, subsets, try_sets)
+from hysteresis_ros.diagnosis.evidence import Evidence, PRACTICAL, SIGNIFICANCE
+from hysteresis_ros.diagnosis.fit import beside, Fitter
+from hysteresis_ros.diagnosis.parameters import starts_of
+from hysteresis_ros.effects import catalogue
+
+MOST_EFFECTS = 3
+# First effects from which sets are grown.
+MOST_SEEDS = 2
+# Effects of which all sets are tried on the bench.
+MOST_IN_SETS = 5
+# Effects that are fitted beside those found, the most promising of a straight extrapolation.
+MOST_RIVALS = 8
+# Pairs that are fitted at once, and at most; a continuous recording takes longer.
+BATCH = 12
+MOST_BATCHES = {True: 5, False: 2}
+# The best pairs are fitted to the end and judged.
+MOST_PAIRS = 4
+# Rivals that are fitted again when a set of effects is checked.
+RIVALS = 6
+MOST_ALTERNATIVES = 3
+
+
+class Search:
+    """
+    What explains a recording, as far as the catalogue goes.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and model.
+    jobs : int
+        Processes.
+    seed : int
+        Of the random draws.
+    progress : callable
+        ``progress(iterable, total)``, for a progress bar.
+
+    Attributes
+    ----------
+    base : Fit
+        Without any further effect.
+    found : Fit
+        With the effects found.
+    first : list of Candidate
+        Every effect by itself, best first.
+    hopeless : dict of str to str
+        Effects that this data cannot show, with the reason.
+    """
+
+    def __init__(self, problem, jobs, seed, progress):
+        self.problem = problem
+        self.fitter = Fitter(problem)
+        self.jobs = jobs
+        self.progress = progress
+        self.rng = np.random.default_rng(seed)
+        self.fixed = list(problem.model.effects)
+        self.base = self.found = self.refit([])
+        self.evidence = Evidence(problem, self.fixed, self.base.predicted, self.rng)
+        self._changes = {}
+        names, self.hopeless = possible(problem, [])
+        self.first = self.consider([], self.base, names)
+
+    def error(self, fit) -> float:
+        """Return the held-out RMSE of a fit."""
+        return self.fitter.error(fit.held_out)
+
+    def refit(self, effects):
+        """Fit effects from their present values, and cross-validate them."""
+        return self.fitter.cross_validate(self.fixed, self.fitter.fit(self.fixed, effects))
+
+    def consider(self, known, current, names) -> list:
+        """Fit each effect named beside the known ones; best first, with p values."""
+        candidates = consider_all(self.fitter, known, current, names, self.jobs, self.progress)
+        values = self.evidence.p_values([candidate.fit for candidate in candidates], current)
+        for candidate, value in zip(candidates, values):
+            candidate.p_value = float(value)
+        return candidates
+
+    def run(self) -> None:
+        """Find the smallest set of those that are nearly as good as the best."""
+        sets = self._on_bench() if self.problem.refits else self._on_arm()
+        if not sets:
+            return
+        best = min(map(self.error, sets))
+        enough = [fit for fit in sets if self.error(fit) <= (1.0 + PRACTICAL) * best]
+        self.found = min(enough, key=lambda fit: (
+            len(fit.effects), len(fit.vector), self.error(fit)))
+        if not self.problem.refits:
+            self._drop()
+
+    def alternatives(self) -> list:
+        """For each effect found, list the names of those that could as well be in its place."""
+        result = []
+        for effect in self.found.effects:
+            others = [other for other in self.found.effects if other is not effect]
+            taken = {other.id for other in self.found.effects}
+            left = [candidate for candidate in self.first if candidate.id not in taken]
+            if others:
+                sets = self._in_order([[*others, candidate.effect] for candidate in left])
+                rivals = consider_sets(self.fitter, sets[:RIVALS], self.jobs, self.progress)
+            else:
+                rivals = [candidate.fit for candidate in left]
+            close = [fit for fit in sorted(rivals, key=self.error) if not fit.implausible()
+                     and self.evidence.could_be(fit, self.found)]
+            result.append([fit.effects[-1].id for fit in close[:MOST_ALTERNATIVES]])
+        return result
+
+    def _on_bench(self):
+        """
+        Fit all sets of those effects that fit best by themselves.
+
+        They need not help by themselves: the paper's first stage already does a part of what a
+        load does, so that one effect of the load alone may well make it worse.
+        """
+        few = [candidate.effect for candidate in self.first][:MOST_IN_SETS]
+        sets = consider_sets(self.fitter, subsets(few, MOST_EFFECTS), self.jobs, self.progress)
+        return [fit for fit in sets if not fit.implausible()
+                and self.evidence.helps(fit, self.base)
+                and self.evidence.p_values([fit], self.base)[0] <= SIGNIFICANCE]
+
+    def _on_arm(self):
+        """Grow sets, from the best plausible effect and from those that fit clearly better."""
+        grown = [self._grow(seed.fit) for seed in self._seeds()]
+        sets = [fit for fit in grown if not fit.implausible()]
+        # Three effects may do what two others are the cause of.
+        few = [fit for fit in [self.base, *sets] if len(fit.effects) < MOST_EFFECTS]
+        if all(self.error(fit) > self.evidence.enough for fit in few):
+            sets += self._pairs(sets)
+        return sets
+
+    def _seeds(self):
+        significant = [candidate for candidate in self.first
+                       if self._significant(candidate, self.base)]
+        plausible = [candidate for candidate in significant if not candidate.implausible]
+        seeds = self._simplest(plausible)
+        limit = (1.0 - PRACTICAL) * plausible[0].rmse if plausible else np.inf
+        better = [candidate for candidate in significant
+                  if candidate.implausible and candidate.rmse < limit]
+        return seeds + better[:MOST_SEEDS - len(seeds)]
+
+    @staticmethod
+    def _simplest(candidates) -> list:
+        """Return the one with fewest parameters of those nearly as good as the first, or []."""
+        enough = [candidate for candidate in candidates
+                  if candidate.rmse <= (1.0 + PRACTICAL) * candidates[0].rmse]
+        return sorted(enough, key=lambda candidate: len(candidate.fit.vector))[:1]
+
+    def _significant(self, candidate, current) -> bool:
+        return (candidate.p_value <= SIGNIFICANCE
+                and self.evidence.helps(candidate.fit, current))
+
+    def _grow(self, fit):
+        """Add effects to a fit while each explains more."""
+        while len(fit.effects) < MOST_EFFECTS and self.error(fit) > self.evidence.enough:
+            known = fit.effects
+            possibly, _ = possible(self.problem, known)
+            names = [name for name in self._worth_another_look(fit) if name in possibly]
+            rivals = [rival for rival in self.consider(known, fit, names)
+                      if self._significant(rival, fit)]
+            plausible = [rival for rival in rivals if not rival.fit.implausible()]
+            chosen = self._simplest(plausible or (rivals if fit.implausible() else []))
+            if not chosen:
+                break
+            fit = self.refit(chosen[0].fit.effects)
+        return fit
+
+    def _worth_another_look(self, fit) -> list:
+        """Effects that have anything to say about what is left, the most promising first."""
+        left = self.problem.measured - fit.predicted
+        limit = (1.0 - PRACTICAL) * float(np.mean(left ** 2))
+        worth = {candidate.id: self._straight([fit.jacobian, self._change_of(candidate)], left)
+                 for candidate in self.first}
+        names = [name for name in sorted(worth, key=worth.get) if worth[name] < limit]
+        return names[:MOST_RIVALS]
+
+    def _straight(self, columns, left) -> float:
+        """Return the held-out mean square error of a straight extrapolation."""
+        return significance.held_out_errors(
+            np.column_stack(columns), left[None, :], self.problem.fold)[0]
+
+    def _change_of(self, candidate) -> np.ndarray:
+        """
+        Return what an effect can change, shape (n, k), for a straight extrapolation.
+
+        As it was fitted by itself and nearby, and at its starts: fitted by itself it may be far
+        from what it is beside another.
+        """
+        if candidate.id not in self._changes:
+            effect = present(self.problem.model, catalogue()[candidate.id])
+            changes = [
+                self.problem.simulate([*beside(self.fixed, [start]), start]) - self.base.predicted
+                for start in starts_of(effect, self.problem.kind)]
+            columns = np.column_stack([candidate.signature, candidate.fit.jacobian, *changes])
+            self._changes[candidate.id] = np.where(
+                np.all(np.isfinite(columns), axis=0), columns, 0.0)
+        return self._changes[candidate.id]
+
+    def _in_order(self, sets) -> list:
+        """
+        Return sets of effects in the order of a straight extrapolation, the most promising first.
+
+        In turn from two extrapolations, from what each effect is by itself with its starts, and
+        without them: neither is right for every effect.
+        """
+        left = self.problem.measured - self.base.predicted
+        near = {candidate.id: np.column_stack([candidate.signature, candidate.fit.jacobian])
+                for candidate in self.first}
+        wide = {candidate.id: self._change_of(candidate) for candidate in self.first}
+        orders = []
+        for columns in (wide, near):
+            worth = [self._straight([columns[effect.id] for effect in one], left) for one in sets]
+            orders.append(sorted(range(len(sets)), key=worth.__getitem__))
+        order = dict.fromkeys(itertools.chain.from_iterable(zip(*orders)))
+        return [sets[index] for index in order]
+
+    def _pairs(self, grown) -> list:
+        """
+        Fit pairs of effects in the order of a straight extrapolation, until one explains it all.
+
+        Kept are those that explain more than the best single effect would with chance's help.
+        """
+        pairs = self._in_order([pair for pair in subsets(
+            [candidate.effect for candidate in self.first], 2) if len(pair) == 2])
+        fits = []
+        for batch in range(MOST_BATCHES[self.problem.settled]):
+            chosen = pairs[batch * BATCH:(batch + 1) * BATCH]
+            fits += try_sets(self.fitter, chosen, self.jobs, self.progress)
+            fits.sort(key=lambda fit: self.fitter.error(fit.predicted))
+            if fits and self.fitter.error(fits[0].predicted) <= self.evidence.floor:
+                break
+        plausible = [fit for fit in fits if not fit.implausible()]
+        best = [self.refit(fit.effects) for fit in plausible[:MOST_PAIRS]]
+        best = [self._grow(fit) for fit in best[:1]] + best
+        best = [fit for fit in best if not fit.implausible()]
+        singles = [fit for fit in grown if len(fit.effects) == 1] or [self.base]
+        single = min(singles, key=self.error)
+        # Any of the pairs might have come out best by chance.
+        jacobians = {candidate.id: candidate.fit.jacobian for candidate in self.first}
+        family = [np.column_stack([jacobians[effect.id] for effect in pair]) for pair in pairs]
+        values = self.evidence.p_values(best, single, family)
+        return [fit for fit, value in zip(best, values)
+                if value <= SIGNIFICANCE and self.evidence.helps(fit, single)]
+
+    def _drop(self) -> None:
+        """Take out an effect that a later one has made needless."""
+        if len(self.found.effects) < 2:
+            return
+        for effect in self.found.effects:
+            without = self.refit([other for other in self.found.effects if other is not effect])
+            if self.error(without) <= (1.0 + PRACTICAL) * self.error(self.found):
+                self.found = without
+                return
