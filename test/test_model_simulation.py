@@ -125,7 +125,8 @@ def test_judged_rows_are_exact_in_every_trial_and_at_the_ends_of_ramps():
                            np.full(31, 1.5)))
     count = len(ramp)
     run = Measurement.from_columns({
-        'time': np.tile(0.1 * np.arange(1, count + 1), 3), 'trial': np.repeat(np.arange(3.0), count),
+        'time': np.tile(0.1 * np.arange(1, count + 1), 3),
+        'trial': np.repeat(np.arange(3.0), count),
         'voltage': np.tile(ramp, 3), 'angle': np.ones(3 * count)})
     full = Simulator(model, run).run([])
     strided = Simulator(model, run, stride=10).run([])

@@ -10,7 +10,7 @@ import joblib
 import numpy as np
 
 from hysteresis_ros.diagnosis.fit import (
-    ESTIMATE_SLACK, FIRST_EVALUATIONS, Fit, MOST_EVALUATIONS)
+    beside, ESTIMATE_SLACK, FIRST_EVALUATIONS, Fit)
 from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue
 
@@ -120,17 +120,18 @@ def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
     """
     problem = fitter.problem
     kind = catalogue()[name]
-    beside = [effect for effect in known if effect.id not in kind.replaces]
+    others = [effect for effect in known if effect.id not in kind.replaces]
     effect = present(problem.model, kind)
     with np.errstate(all='ignore'):
-        fit = fitter.search(problem.model.effects, beside, effect)
+        fit = fitter.search(problem.model.effects, others, effect)
         fit = fitter.cross_validate(problem.model.effects, fit)
-    if not (np.all(np.isfinite(fit.held_out)) and np.all(np.isfinite(fit.jacobian))):
+    if _finite(fit) is None:
         return None
     before = fitter.error(current.held_out)
     after = fitter.error(fit.held_out)
     return Candidate(name, fit, fit.predicted - current.predicted, after,
-                     before ** 2 - after ** 2, implausible=fit.effects[-1].implausible(ESTIMATE_SLACK))
+                     before ** 2 - after ** 2,
+                     implausible=fit.effects[-1].implausible(ESTIMATE_SLACK))
 
 
 def _in_parallel(tasks, jobs):
@@ -153,32 +154,44 @@ def consider_all(fitter, known, current: Fit, names, jobs: int, progress) -> lis
     return sorted(found, key=lambda candidate: candidate.rmse)
 
 
-def _try_set(fitter, effects, evaluations=MOST_EVALUATIONS) -> Fit | None:
-    """Fit some effects together, from usual values and from those that each had alone."""
-    problem = fitter.problem
+def _starts(effects, kind) -> tuple[list, list]:
+    """Return usual values of some effects, and those that each had alone."""
     usual = []
     for effect in effects:
-        starts = starts_of(effect, problem.kind)
+        starts = starts_of(effect, kind)
         # What is not fitted but chosen was chosen well by the effect alone.
         usual.append(starts[len(starts) // 2].with_values(**{
             parameter.name: effect.values[parameter.name]
             for parameter in effect.parameters if parameter.choices}))
+    return usual, list(effects)
+
+
+def _try_set(fitter, effects) -> Fit | None:
+    """Fit some effects together for a few steps from the better start."""
+    problem = fitter.problem
+
+    def error(start):
+        predicted = problem.simulate([*beside(problem.model.effects, start), *start])
+        return fitter.error(predicted)
     with np.errstate(all='ignore'):
-        fits = [fitter.fit(problem.model.effects, start, evaluations=evaluations)
-                for start in (usual, effects)]
-    best = min(fits, key=lambda fit: fitter.error(fit.predicted))
-    finite = np.all(np.isfinite(best.predicted)) and np.all(np.isfinite(best.jacobian))
-    return best if finite else None
+        start = min(_starts(effects, problem.kind), key=error)
+        return _finite(fitter.fit(problem.model.effects, start, evaluations=FIRST_EVALUATIONS))
 
 
 def _consider_set(fitter, effects) -> Fit | None:
-    """Fit some effects together and cross-validate them."""
-    fit = _try_set(fitter, effects)
-    if fit is None:
-        return None
+    """Fit some effects together from either start, and cross-validate the better fit."""
+    problem = fitter.problem
     with np.errstate(all='ignore'):
-        fit = fitter.cross_validate(fitter.problem.model.effects, fit)
-    return fit if np.all(np.isfinite(fit.held_out)) else None
+        fits = [fitter.fit(problem.model.effects, start)
+                for start in _starts(effects, problem.kind)]
+        best = min(fits, key=lambda fit: fitter.error(fit.predicted))
+        return _finite(fitter.cross_validate(problem.model.effects, best))
+
+
+def _finite(fit) -> Fit | None:
+    """Return a fit, or None where the simulation with it is not finite."""
+    judged = fit.predicted if fit.held_out is None else fit.held_out
+    return fit if np.all(np.isfinite(judged)) and np.all(np.isfinite(fit.jacobian)) else None
 
 
 def subsets(effects, most: int) -> list[list]:
@@ -196,5 +209,5 @@ def consider_sets(fitter, sets, jobs: int, progress) -> list[Fit]:
 
 def try_sets(fitter, sets, jobs: int, progress) -> list[Fit]:
     """Fit sets of effects for a few steps, to see which are worth more; in parallel."""
-    tasks = [joblib.delayed(_try_set)(fitter, effects, FIRST_EVALUATIONS) for effects in sets]
+    tasks = [joblib.delayed(_try_set)(fitter, effects) for effects in sets]
     return [fit for fit in progress(_in_parallel(tasks, jobs), len(sets)) if fit is not None]

@@ -28,11 +28,10 @@ MOST_SEEDS = 2
 MOST_IN_SETS = 5
 # Effects that are fitted beside those found, the most promising of a straight extrapolation.
 MOST_RIVALS = 8
-# Pairs that are fitted at once, and at most; a continuous recording takes longer.
-BATCH = 12
-MOST_BATCHES = {True: 5, False: 2}
-# The best pairs are fitted to the end and judged.
-MOST_PAIRS = 4
+# Numbers of pairs that are fitted one after the other until one explains it all, and how many of
+# the best are then fitted to the end, by whether rows are settled: a continuous one takes longer.
+BATCHES = {True: (12, 12, 12, 12, 12), False: (8,)}
+MOST_PAIRS = {True: 4, False: 2}
 # Rivals that are fitted again when a set of effects is checked.
 RIVALS = 6
 MOST_ALTERNATIVES = 3
@@ -239,15 +238,15 @@ class Search:
         """
         pairs = self._in_order([pair for pair in subsets(
             [candidate.effect for candidate in self.first], 2) if len(pair) == 2])
-        fits = []
-        for batch in range(MOST_BATCHES[self.problem.settled]):
-            chosen = pairs[batch * BATCH:(batch + 1) * BATCH]
+        fits, waiting, settled = [], iter(pairs), self.problem.settled
+        for count in BATCHES[settled]:
+            chosen = list(itertools.islice(waiting, count))
             fits += try_sets(self.fitter, chosen, self.jobs, self.progress)
             fits.sort(key=lambda fit: self.fitter.error(fit.predicted))
             if fits and self.fitter.error(fits[0].predicted) <= self.evidence.floor:
                 break
         plausible = [fit for fit in fits if not fit.implausible()]
-        best = [self.refit(fit.effects) for fit in plausible[:MOST_PAIRS]]
+        best = [self.refit(fit.effects) for fit in plausible[:MOST_PAIRS[settled]]]
         best = [self._grow(fit) for fit in best[:1]] + best
         best = [fit for fit in best if not fit.implausible()]
         singles = [fit for fit in grown if len(fit.effects) == 1] or [self.base]
