@@ -3,6 +3,7 @@
 """`hysteresis demo`: the whole system on the simulated arm, from the bench to the comparison."""
 
 import argparse
+import dataclasses
 from pathlib import Path
 import shutil
 
@@ -10,9 +11,13 @@ import numpy as np
 
 from hysteresis_ros.cli.common import add_json, progress, say, write_json
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.measurements import settled_rows
 
-HOLD = 30.0
 VALUES = 40
+# Time for which a target is held [s]: until the arm rests, or while it is still on its way, at
+# which the arm's time may not run much faster than the nodes can follow.
+SETTLED_HOLD = 30.0
+PASSING_HOLD, PASSING_SPEED = 6.0, 12.0
 
 
 def add_parser(subparsers):
@@ -41,21 +46,54 @@ def add_parser(subparsers):
     return parser
 
 
-# Effects whose inverse makes the arm better in settled steps, for a draw.
-DRAWN = ('payload_error', 'supply_sag', 'encoder_offset', 'coulomb_friction', 'frame_tilt',
-         'airflow', 'backlash')
+# Effects whose inverse makes the arm better: in settled steps, and on its way. One is drawn.
+SETTLED = ('payload_error', 'supply_sag', 'encoder_offset', 'coulomb_friction', 'frame_tilt',
+           'airflow', 'backlash')
+PASSING = ('thermal_lag', 'heating_cooling_asymmetry')
+
+
+@dataclasses.dataclass
+class Pace:
+    """
+    How fast the targets follow each other.
+
+    Attributes
+    ----------
+    hold : float
+        Time for each target [s of the arm's clock].
+    speed : float
+        The arm's time against the wall clock's.
+    settled : bool
+        Whether only rows count in which the arm rests.
+    """
+
+    hold: float
+    speed: float
+    settled: bool
+
+    def rows(self, bag):
+        """Return what is compared and diagnosed of a recording."""
+        return (settled_rows(bag) or bag) if self.settled else bag
+
+
+def pace_of(args, hidden) -> Pace:
+    """Return a pace at which the hidden effect matters."""
+    if hidden in PASSING:
+        return Pace(PASSING_HOLD, min(args.speed, PASSING_SPEED), False)
+    return Pace(SETTLED_HOLD, args.speed, True)
 
 
 def run(args):
     """Do it."""
     from hysteresis_ros.diagnosis.compare import compare
-    from hysteresis_ros.measurements import read_measurement, settled_rows
+    from hysteresis_ros.measurements import read_measurement
 
     if args.values < 4:
         raise ParameterError('--values must be at least 4')
     if not 0.1 <= args.speed <= 200.0:
         raise ParameterError('--speed must be from 0.1 to 200')
     hidden = drawn(args)
+    pace = pace_of(args, hidden)
     folder = Path(args.output)
     if folder.exists() and not (folder / 'model.yaml').exists() and any(folder.iterdir()):
         raise ParameterError(f'{folder}: not empty and not a demo; name another folder with -o')
@@ -64,18 +102,18 @@ def run(args):
     model = bench_model(args, folder)
     sequences = target_sequences(model, args)
     result = {'runs': []}
-    runs = drive(args, folder / 'run', sequences, folder / 'model.yaml', hidden)
+    runs = drive(args, folder / 'run', sequences, folder / 'model.yaml', hidden, pace)
     result['runs'].append(summary('the identified model', sequences, runs))
-    linear = linear_runs(args, model, sequences, hidden)
+    linear = linear_runs(args, model, sequences, hidden, pace)
     result['linear'] = summary('the linear model', sequences, linear)
     say(args, table(result))
-    bag = read_measurement(folder / 'run')
-    comparison = compare(model, [settled_rows(bag) or bag])
+    data = [pace.rows(read_measurement(folder / 'run'))]
+    comparison = compare(model, data)
     say(args, '\n' + comparison.to_text())
     again = None
     if hidden:
-        again = find_and_extend(args, folder, model, sequences, bag, hidden, result)
-    draw(folder / 'demo.png', sequences, runs, linear, again)
+        again = find_and_extend(args, folder, model, sequences, data, hidden, pace, result)
+    draw(folder / 'demo.png', sequences, runs, linear, again, pace)
     say(args, f'\nPicture: {folder / "demo.png"}; recording: {folder / "run"} (rosbag2, mcap)')
     if args.json:
         write_json(args.json, result)
@@ -113,7 +151,7 @@ def drawn(args):
     if args.hidden != 'random':
         raise ParameterError(f'--hidden: there is no effect {args.hidden!r}; there are '
                              + ', '.join(EFFECTS))
-    return str(np.random.default_rng([args.seed, 77]).choice(DRAWN))
+    return str(np.random.default_rng([args.seed, 77]).choice([*SETTLED, *PASSING]))
 
 
 def target_sequences(model, args):
@@ -131,28 +169,29 @@ def target_sequences(model, args):
     return {'sinusoidal': sinusoid, 'random': chance.uniform(low, high, args.values)}
 
 
-def drive(args, folder, sequences, model_file, hidden):
+def drive(args, folder, sequences, model_file, hidden, pace):
     """Drive the arm with the three nodes and return the angles reached, by sequence."""
     try:
         from hysteresis_ros.nodes.session import record
     except ImportError as error:
         raise ParameterError(f'the demo needs ROS 2: {error}; run it with `make demo`') from None
 
-    port = f'sim://bicep?speed={args.speed:g}&seed={args.seed}'
+    port = f'sim://bicep?speed={pace.speed:g}&seed={args.seed}'
     if hidden:
         port += f'&{hidden}={args.strength:g}'
     parameters = {
         'port': port, 'model_file': str(Path(model_file).resolve()), 'use_sim_time': True,
-        'telemetry_rate': 2.0, 'republish_period': 5.0, 'setpoint_timeout': 60.0,
+        'telemetry_rate': 2.0, 'horizon': min(5.0, 0.7 * pace.hold),
+        'republish_period': min(5.0, pace.hold / 6.0), 'setpoint_timeout': 60.0,
         'telemetry_timeout': 30.0, 'board_watchdog': 30.0}
     steps = iter(progress(range(len(sequences) * args.values), 'driving',
                           len(sequences) * args.values))
-    reached = record(folder, list(sequences.values()), parameters, HOLD,
+    reached = record(folder, list(sequences.values()), parameters, pace.hold,
                      lambda: next(steps, None))
     return dict(zip(sequences, reached))
 
 
-def linear_runs(args, model, sequences, hidden):
+def linear_runs(args, model, sequences, hidden, pace):
     """Apply the linear model's voltages to the same simulated arm, without nodes."""
     from hysteresis_ros.laboratory.plant import Plant
 
@@ -163,7 +202,7 @@ def linear_runs(args, model, sequences, hidden):
         voltages = np.clip(model.linear.drive_for_length(
             geometry.length(targets), geometry.force(targets)), low, high)
         plant = Plant(args.seed, {hidden: args.strength} if hidden else {})
-        reached[name] = plant.arm_trial(voltages)['angle']
+        reached[name] = plant.arm_trial(voltages, hold=pace.hold)['angle']
     return reached
 
 
@@ -194,14 +233,12 @@ def table(result):
     return '\n'.join(layout(rows))
 
 
-def find_and_extend(args, folder, model, sequences, bag, hidden, result):
+def find_and_extend(args, folder, model, sequences, data, hidden, pace, result):
     """Diagnose the recording, extend the model, drive again; return the angles reached then."""
     from hysteresis_ros.cli.diagnose import to_text
     from hysteresis_ros.diagnosis.diagnose import diagnose
     from hysteresis_ros.diagnosis.extend import extend
-    from hysteresis_ros.measurements import settled_rows
 
-    data = [settled_rows(bag) or bag]
     found = diagnose(model, data, jobs=-1,
                      progress=lambda items, total: progress(items, 'effects', total))
     say(args, '\n' + to_text(found, 'angle'))
@@ -210,7 +247,8 @@ def find_and_extend(args, folder, model, sequences, bag, hidden, result):
     if found.missing:
         extension = extend(model, found.missing, data)
         extension.model.save(folder / 'extended.yaml')
-        again = drive(args, folder / 'run_extended', sequences, folder / 'extended.yaml', hidden)
+        again = drive(args, folder / 'run_extended', sequences, folder / 'extended.yaml', hidden,
+                      pace)
         result['runs'].append(summary('the extended model', sequences, again))
         say(args, '\nDriven again with the extended model:\n' + table(result))
     result['hidden'] = hidden
@@ -218,7 +256,7 @@ def find_and_extend(args, folder, model, sequences, bag, hidden, result):
     return again
 
 
-def draw(path, sequences, runs, linear, again):
+def draw(path, sequences, runs, linear, again, pace):
     """Save the picture: targets and angles reached, and the errors."""
     from hysteresis_ros.diagnosis.plots import new_figure, png
 
@@ -238,7 +276,7 @@ def draw(path, sequences, runs, linear, again):
             lower.plot(index, np.degrees(reached - targets), line, marker='o', ms=3, lw=0.8,
                        color=colour)
         lower.axhline(0.0, color='black', lw=0.8)
-        upper.set_title(f'{name} sequence, {len(targets)} values held for {HOLD:g} s')
+        upper.set_title(f'{name} sequence, {len(targets)} values held for {pace.hold:g} s')
         lower.set_xlabel('index')
     axes[0, 0].set_ylabel('angle [deg]')
     axes[1, 0].set_ylabel('error [deg]')

@@ -21,7 +21,8 @@ from hysteresis_ros.effects import catalogue
 
 # Effects whose signatures agree more than this cannot be told apart.
 CONFUSED = 0.9
-# More than this share of the first mean square left over means that the cause is not known.
+# More than this share of the first mean square left over means that the cause is not known. Several
+# effects share it: together they fit more, so that they have to explain more.
 UNEXPLAINED = {'arm': 0.08, 'bench': 0.3}
 # A structured error on the bench below this share of the response's range is that of any model.
 LEAST_STRUCTURE = 0.02
@@ -152,10 +153,11 @@ class _Verdict:
                     and np.sqrt(1.0 - share) * self.before < (1.0 - PRACTICAL) * self.after)
         if not happened:
             event = left.event if left.event_share > EVENT_SHARE else None
-        unknown = happened or unexplained > UNEXPLAINED[problem.kind]
+        allowed = UNEXPLAINED[problem.kind] / max(len(search.found.effects), 1)
+        unknown = happened or unexplained > allowed
         if unknown:
             # What explains a part of it stands in the ranking; the cause is none of these.
-            search.found, self.after = search.base, self.before
+            search.found, search.rivals, self.after = search.base, [], self.before
         not_excited = {**search.hopeless, **self._hidden()}
         verdict = 'unknown' if unknown else self._known(not_excited)
         alternatives = search.alternatives()

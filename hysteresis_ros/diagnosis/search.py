@@ -60,6 +60,8 @@ class Search:
         With the effects found.
     first : list of Candidate
         Every effect by itself, best first.
+    rivals : list of Fit
+        Other sets of as many effects.
     hopeless : dict of str to str
         Effects that this data cannot show, with the reason.
     """
@@ -73,6 +75,7 @@ class Search:
         self.fixed = list(problem.model.effects)
         self.base = self.found = self.refit([])
         self.evidence = Evidence(problem, self.fixed, self.base.predicted, self.rng)
+        self.rivals = []
         self._changes = {}
         names, self.hopeless = possible(problem, [])
         self.first = self.consider([], self.base, names)
@@ -102,15 +105,17 @@ class Search:
         enough = [fit for fit in sets if self.error(fit) <= (1.0 + PRACTICAL) * best]
         self.found = min(enough, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.error(fit)))
+        self.rivals = [fit for fit in sets if fit is not self.found
+                       and len(fit.effects) == len(self.found.effects)]
         if not self.problem.refits:
             self._drop()
 
     def alternatives(self) -> list:
         """For each effect found, list the names of those that could as well be in its place."""
         result = []
+        taken = {effect.id for effect in self.found.effects}
         for effect in self.found.effects:
             others = [other for other in self.found.effects if other is not effect]
-            taken = {other.id for other in self.found.effects}
             left = [candidate for candidate in self.first if candidate.id not in taken]
             if others:
                 sets = self._in_order([[*others, candidate.effect] for candidate in left])
@@ -120,7 +125,22 @@ class Search:
             close = [fit for fit in sorted(rivals, key=self.error) if not fit.implausible()
                      and self.evidence.could_be(fit, self.found)]
             result.append([fit.effects[-1].id for fit in close[:MOST_ALTERNATIVES]])
+        self._add_rivals(result)
         return result
+
+    def _add_rivals(self, alternatives) -> None:
+        """Add the effects of whole sets that could as well be the truth."""
+        for rival in sorted(self.rivals, key=self.error):
+            if not self.evidence.could_be(rival, self.found):
+                continue
+            names = [effect.id for effect in rival.effects]
+            places = [place for place, effect in enumerate(self.found.effects)
+                      if effect.id not in names]
+            taken = {effect.id for effect in self.found.effects}
+            new = [name for name in names if name not in taken]
+            for place, name in zip(places, new):
+                if not any(name in named for named in alternatives):
+                    alternatives[place].append(name)
 
     def _on_bench(self):
         """
