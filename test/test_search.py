@@ -1,0 +1,81 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What counts as evidence for an effect, and which sets are reported beside the one found."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis.evidence import Evidence
+from hysteresis_ros.diagnosis.fit import Fit
+from hysteresis_ros.diagnosis.search import Search
+
+ROWS = 120
+FOLD = np.arange(ROWS) % 4
+BLOCK = np.arange(ROWS) // 5
+MEASURED = np.sin(np.arange(ROWS))
+CHANCE = np.random.default_rng(1)
+
+
+def evidence(size=0.1):
+    """Return the evidence of an arm run whose base model errs by `size` at random."""
+    made = object.__new__(Evidence)
+    made.problem = SimpleNamespace(
+        measured=MEASURED, fold=FOLD, block=BLOCK, refits=False, noise=0.0)
+    made.rng = np.random.default_rng(2)
+    made.structure = size
+    made.decoys = size * np.random.default_rng(3).standard_normal((100, ROWS))
+    return made
+
+
+def fit(error, columns=None, names=()):
+    """Return a fit with this error in every row, of random sign."""
+    signs = np.random.default_rng(4).choice((-1.0, 1.0), ROWS)
+    predicted = MEASURED - error * signs
+    columns = np.zeros((ROWS, 0)) if columns is None else columns
+    return Fit([SimpleNamespace(id=name) for name in names], np.zeros(columns.shape[1]), predicted,
+               columns, held_out=predicted)
+
+
+def test_a_gain_counts_only_against_the_best_of_the_family():
+    """Forty columns explain more of a decoy by chance than the one that was fitted."""
+    column = CHANCE.standard_normal((ROWS, 1))
+    base, better = fit(0.3), fit(0.295, column)
+    alone, = evidence(0.3).p_values([better], base)
+    # On held-out rows columns of noise do not explain; those that are in the decoys do.
+    made = evidence(0.3)
+    family = [np.sin(np.outer(np.arange(ROWS), [0.1])) for _ in range(3)]
+    made.decoys = made.decoys + 0.5 * CHANCE.standard_normal((100, 1)) * family[0].T
+    among, = made.p_values([better], base, family)
+    assert alone < 0.05 < 0.5 < among
+
+
+def test_an_effect_has_to_help_enough_and_in_most_blocks():
+    """Five per cent of the error, and not in one place only."""
+    base = fit(1.0)
+    assert evidence().helps(fit(0.94), base) and not evidence().helps(fit(0.96), base)
+    once = fit(1.0)
+    once.held_out = np.where(BLOCK < 8, MEASURED, once.held_out)
+    assert not evidence().helps(once, base)
+
+
+@pytest.mark.parametrize('error, possible', [(0.1, True), (0.104, True), (0.5, False)])
+def test_a_rival_that_is_hardly_worse_could_be_the_truth(error, possible):
+    """Also where both predict so much the same that chance could not tell them apart either."""
+    column = CHANCE.standard_normal((ROWS, 1))
+    assert evidence().could_be(fit(error, column), fit(0.1, column)) == possible
+
+
+def test_a_whole_set_that_could_be_the_truth_is_named_place_by_place():
+    """An effect of it that is known already stays where it is; nothing is named twice."""
+    search = object.__new__(Search)
+    search.found = fit(0.1, names=('stress_dependence', 'coulomb_friction'))
+    search.rivals = [
+        fit(0.12, names=('supply_sag', 'pwm_dead_zone')), fit(9.0, names=('slack', 'creep')),
+        fit(0.11, names=('airflow', 'coulomb_friction')), fit(0.13, names=('airflow', 'backlash'))]
+    search.fitter = SimpleNamespace(error=lambda held: np.sqrt(np.mean((held - MEASURED) ** 2)))
+    search.evidence = SimpleNamespace(could_be=lambda rival, found: search.error(rival) < 1.0)
+    alternatives = [['latency'], []]
+    search._add_rivals(alternatives)
+    assert alternatives == [['latency', 'airflow', 'supply_sag'], ['pwm_dead_zone', 'backlash']]
