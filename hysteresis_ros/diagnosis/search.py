@@ -175,11 +175,16 @@ class Search:
                   if candidate.implausible and candidate.rmse < limit]
         return seeds + better[:MOST_SEEDS - len(seeds)]
 
-    @staticmethod
-    def _simplest(candidates) -> list:
-        """Return the one with fewest parameters of those nearly as good as the first, or []."""
+    def _simplest(self, candidates) -> list:
+        """
+        Return the one with fewest parameters of those nearly as good as the first, or [].
+
+        One that the first contains is as good as long as what it lacks could be chance.
+        """
         enough = [candidate for candidate in candidates
-                  if candidate.rmse <= (1.0 + PRACTICAL) * candidates[0].rmse]
+                  if candidate.rmse <= (1.0 + PRACTICAL) * candidates[0].rmse
+                  or candidate.id in candidates[0].effect.replaces
+                  and self.evidence.p_values([candidates[0].fit], candidate.fit)[0] > SIGNIFICANCE]
         return sorted(enough, key=lambda candidate: len(candidate.fit.vector))[:1]
 
     def _significant(self, candidate, current) -> bool:
