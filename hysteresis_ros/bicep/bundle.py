@@ -12,7 +12,7 @@ from hysteresis_ros.bicep.root import bracket
 # Force per elongation [N/m] of a wire that is wholly in one phase.
 ELASTICITY = 5e3
 # First step [m] of the search for the balance, at least; how exactly it is found [m].
-FIRST_STEP, EXACT = 1e-5, 1e-9
+FIRST_STEP, EXACT = 1e-5, 1e-11
 # About how far the muscles go for a load that is missing [m/N].
 USUAL_GAIN = 1e-3
 
