@@ -22,6 +22,8 @@ from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue
 
 MOST_EFFECTS = 3
+# What is added to others has to take this share off the first error, or a user would not see it.
+LEAST_SHARE = 0.015
 # First effects from which sets are grown.
 MOST_SEEDS = 2
 # Effects of which all sets are tried on the bench.
@@ -187,6 +189,10 @@ class Search:
                   and self.evidence.p_values([candidates[0].fit], candidate.fit)[0] > SIGNIFICANCE]
         return sorted(enough, key=lambda candidate: len(candidate.fit.vector))[:1]
 
+    def _matters(self, fit, current) -> bool:
+        """Whether more effects take off enough to be seen beside what was wrong at first."""
+        return self.error(current) - self.error(fit) >= LEAST_SHARE * self.error(self.base)
+
     def _significant(self, candidate, current) -> bool:
         return (candidate.p_value <= SIGNIFICANCE
                 and self.evidence.helps(candidate.fit, current))
@@ -198,7 +204,7 @@ class Search:
             possibly, _ = possible(self.problem, known)
             names = [name for name in self._worth_another_look(fit) if name in possibly]
             rivals = [rival for rival in self.consider(known, fit, names)
-                      if self._significant(rival, fit)]
+                      if self._matters(rival.fit, fit) and self._significant(rival, fit)]
             plausible = [rival for rival in rivals if not rival.fit.implausible()]
             chosen = self._simplest(plausible or (rivals if fit.implausible() else []))
             if not chosen:
@@ -281,7 +287,8 @@ class Search:
         family = [np.column_stack([jacobians[effect.id] for effect in pair]) for pair in pairs]
         values = self.evidence.p_values(best, single, family)
         return [fit for fit, value in zip(best, values)
-                if value <= SIGNIFICANCE and self.evidence.helps(fit, single)]
+                if value <= SIGNIFICANCE and self.evidence.helps(fit, single)
+                and self._matters(fit, single)]
 
     def _drop(self) -> None:
         """Take out an effect that a later one has made needless."""
