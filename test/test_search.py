@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hysteresis_ros.diagnosis.diagnose import most_unexplained
 from hysteresis_ros.diagnosis.evidence import Evidence
 from hysteresis_ros.diagnosis.fit import Fit
 from hysteresis_ros.diagnosis.search import Search
@@ -79,3 +80,44 @@ def test_a_whole_set_that_could_be_the_truth_is_named_place_by_place():
     alternatives = [['latency'], []]
     search._add_rivals(alternatives)
     assert alternatives == [['latency', 'airflow', 'supply_sag'], ['pwm_dead_zone', 'backlash']]
+
+
+def searching(base):
+    """Return a search that has fitted nothing but `base`, an arm run's."""
+    search = object.__new__(Search)
+    search.base = base
+    search.evidence = evidence()
+    search.fitter = SimpleNamespace(error=lambda held: np.sqrt(np.mean((held - MEASURED) ** 2)))
+    return search
+
+
+def test_what_is_added_has_to_take_off_a_share_of_the_first_error():
+    """Half of what the first effect has left is not much where that was little."""
+    search = searching(fit(10.0))
+    assert not search._matters(fit(0.20), fit(0.34))
+    assert search._matters(fit(0.20), fit(0.36))
+
+
+@pytest.mark.parametrize('contained, first', [('wide', 'narrow'), ('other', 'wide')])
+def test_an_effect_gives_way_to_one_that_it_contains_while_the_rest_may_be_chance(contained, first):
+    """Not to one that has nothing to do with it, which is clearly worse."""
+    def candidate(name, error, count, replaces=()):
+        made = fit(error, CHANCE.standard_normal((ROWS, count)))
+        return SimpleNamespace(id=name, fit=made, rmse=error,
+                               effect=SimpleNamespace(replaces=replaces))
+    search = searching(fit(1.0))
+    # So large is what the base model errs by itself that a gain like this one is chance.
+    search.evidence = evidence(5.0)
+    replaces = ('narrow',) if contained == 'wide' else ()
+    wide, narrow = candidate('wide', 0.10, 2, replaces), candidate('narrow', 0.11, 1)
+    chosen, = search._simplest([wide, narrow])
+    assert chosen.id == first
+    search.evidence = evidence(1e-6)
+    chosen, = search._simplest([wide, narrow])
+    assert chosen.id == 'wide'
+
+
+def test_more_effects_have_to_explain_more():
+    """Two may leave half as much as one; with none found there is one cause to find."""
+    assert most_unexplained('arm', 2) == 0.5 * most_unexplained('arm', 1)
+    assert most_unexplained('arm', 0) == most_unexplained('arm', 1)

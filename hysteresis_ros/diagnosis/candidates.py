@@ -9,8 +9,7 @@ import math
 import joblib
 import numpy as np
 
-from hysteresis_ros.diagnosis.fit import (
-    beside, ESTIMATE_SLACK, FIRST_EVALUATIONS, Fit)
+from hysteresis_ros.diagnosis.fit import beside, FIRST_EVALUATIONS, Fit
 from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue
 
@@ -33,21 +32,15 @@ class Candidate:
         What it changes in the response.
     rmse : float
         Held-out error with it.
-    gain : float
-        Reduction of the mean square held-out error.
     p_value : float
         Family-wise; 1 until tested.
-    implausible : list of str
-        Its parameters outside their physical range.
     """
 
     id: str
     fit: Fit
     signature: np.ndarray
     rmse: float
-    gain: float
     p_value: float = 1.0
-    implausible: list = dataclasses.field(default_factory=list)
 
     @property
     def effect(self):
@@ -127,11 +120,7 @@ def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
         fit = fitter.cross_validate(problem.model.effects, fit)
     if _finite(fit) is None:
         return None
-    before = fitter.error(current.held_out)
-    after = fitter.error(fit.held_out)
-    return Candidate(name, fit, fit.predicted - current.predicted, after,
-                     before ** 2 - after ** 2,
-                     implausible=fit.effects[-1].implausible(ESTIMATE_SLACK))
+    return Candidate(name, fit, fit.predicted - current.predicted, fitter.error(fit.held_out))
 
 
 def _in_parallel(tasks, jobs):

@@ -21,8 +21,7 @@ from hysteresis_ros.effects import catalogue
 
 # Effects whose signatures agree more than this cannot be told apart.
 CONFUSED = 0.9
-# More than this share of the first mean square left over means that the cause is not known. Several
-# effects share it: together they fit more, so that they have to explain more.
+# More than this share of the first mean square left over means that the cause is not known.
 UNEXPLAINED = {'arm': 0.08, 'bench': 0.3}
 # A structured error on the bench below this share of the response's range is that of any model.
 LEAST_STRUCTURE = 0.02
@@ -129,6 +128,15 @@ def diagnose(model, measurements, jobs: int = 1, seed: int = 0, progress=_silent
     return _Verdict(search).sum_up()
 
 
+def most_unexplained(kind: str, count: int) -> float:
+    """
+    Return the share of the first mean square that `count` effects may leave over.
+
+    Together they fit more, so that they have to explain more.
+    """
+    return UNEXPLAINED[kind] / max(count, 1)
+
+
 class _Verdict:
     """What follows from a search."""
 
@@ -153,8 +161,8 @@ class _Verdict:
                     and np.sqrt(1.0 - share) * self.before < (1.0 - PRACTICAL) * self.after)
         if not happened:
             event = left.event if left.event_share > EVENT_SHARE else None
-        allowed = UNEXPLAINED[problem.kind] / max(len(search.found.effects), 1)
-        unknown = happened or unexplained > allowed
+        unknown = happened or unexplained > most_unexplained(
+            problem.kind, len(search.found.effects))
         if unknown:
             # What explains a part of it stands in the ranking; the cause is none of these.
             search.found, search.rivals, self.after = search.base, [], self.before
@@ -242,7 +250,7 @@ class _Verdict:
                 'effect': candidate.id, 'rmse_before': self.before, 'rmse_after': candidate.rmse,
                 'gain': 1.0 - candidate.rmse / self.before, 'gain_low': low, 'gain_high': high,
                 'p_value': candidate.p_value, 'parameters': effect.to_dict()['parameters'],
-                'plausible': not candidate.implausible,
+                'plausible': not candidate.fit.implausible(),
                 'absorbed': float(np.clip(absorbed[index], 0.0, 1.0)),
                 'confused_with': [other.id for other, cosine in zip(first, alike[index])
                                   if other is not candidate and cosine > CONFUSED]})

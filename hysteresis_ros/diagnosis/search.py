@@ -107,10 +107,10 @@ class Search:
         enough = [fit for fit in sets if self.error(fit) <= (1.0 + PRACTICAL) * best]
         self.found = min(enough, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.error(fit)))
-        self.rivals = [fit for fit in sets if fit is not self.found
-                       and len(fit.effects) == len(self.found.effects)]
         if not self.problem.refits:
             self._drop()
+        self.rivals = [fit for fit in sets if fit is not self.found
+                       and len(fit.effects) == len(self.found.effects)]
 
     def alternatives(self) -> list:
         """For each effect found, list the names of those that could as well be in its place."""
@@ -170,11 +170,11 @@ class Search:
     def _seeds(self):
         significant = [candidate for candidate in self.first
                        if self._significant(candidate, self.base)]
-        plausible = [candidate for candidate in significant if not candidate.implausible]
+        plausible = [candidate for candidate in significant if not candidate.fit.implausible()]
         seeds = self._simplest(plausible)
         limit = (1.0 - PRACTICAL) * plausible[0].rmse if plausible else np.inf
         better = [candidate for candidate in significant
-                  if candidate.implausible and candidate.rmse < limit]
+                  if candidate.fit.implausible() and candidate.rmse < limit]
         return seeds + better[:MOST_SEEDS - len(seeds)]
 
     def _simplest(self, candidates) -> list:
