@@ -11,8 +11,10 @@ from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 
 # Simulated responses are smooth only on this scale of the parameters' units.
 DIFFERENCE = 0.02
-# Starts that are followed for a few steps after all were tried once; the best goes on.
+# Starts that are followed for a few steps after all were tried once, if their mean square error is
+# not larger than the best's by this factor; the best goes on.
 FOLLOWED_STARTS = 2
+WORTH_FOLLOWING = 2.0
 FIRST_EVALUATIONS = 4
 MOST_EVALUATIONS = 8
 HELD_OUT_EVALUATIONS = 3
@@ -169,9 +171,11 @@ class Fitter:
         if len(kept) < len(fixed):
             # What the bench says of it is as good a start as any.
             starts.append(effect)
-        starts.sort(key=error)
+        errors = [error(start) for start in starts]
+        order = np.argsort(errors, kind='stable')
         # Beside others only the best is fitted to the end, by whoever chooses it.
-        followed = starts[:1] if known else starts[:FOLLOWED_STARTS]
+        followed = [starts[index] for index in order[:1 if known else FOLLOWED_STARTS]
+                    if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
         fits = [self.fit(fixed, [*known, start], rows, FIRST_EVALUATIONS) for start in followed]
         best = min(fits, key=lambda fit: self.error(fit.predicted, mask))
         return best if best.converged or known else self.fit(fixed, best.effects, rows)

@@ -163,7 +163,7 @@ class Search:
         sets = [fit for fit in grown if not fit.implausible()]
         # Three effects may do what two others are the cause of.
         few = [fit for fit in [self.base, *sets] if len(fit.effects) < MOST_EFFECTS]
-        if all(self.error(fit) > self.evidence.enough for fit in few):
+        if all(self._leaves(fit) for fit in few):
             sets += self._pairs(sets)
         return sets
 
@@ -193,13 +193,19 @@ class Search:
         """Whether more effects take off enough to be seen beside what was wrong at first."""
         return self.error(current) - self.error(fit) >= LEAST_SHARE * self.error(self.base)
 
+    def _leaves(self, fit) -> bool:
+        """Whether a fit leaves so much that what takes it away could matter."""
+        left = self.error(fit)
+        return (left > self.evidence.enough
+                and left - self.evidence.floor >= LEAST_SHARE * self.error(self.base))
+
     def _significant(self, candidate, current) -> bool:
         return (candidate.p_value <= SIGNIFICANCE
                 and self.evidence.helps(candidate.fit, current))
 
     def _grow(self, fit):
         """Add effects to a fit while each explains more."""
-        while len(fit.effects) < MOST_EFFECTS and self.error(fit) > self.evidence.enough:
+        while len(fit.effects) < MOST_EFFECTS and self._leaves(fit):
             known = fit.effects
             possibly, _ = possible(self.problem, known)
             names = [name for name in self._worth_another_look(fit) if name in possibly]

@@ -260,11 +260,7 @@ class Creep(MaterialEffect):
     def drift(self, drive, heat, inputs, surroundings):
         """Return the same for a whole trial at once."""
         if self.kept:
-            self.start()
-            return np.array([
-                self._relax(phase, decays, surroundings)
-                for phase, decays in zip(inputs.phase.tolist(), self._decays(inputs.step))
-            ]), np.ones(len(drive))
+            return self._relaxed(inputs, surroundings), np.ones(len(drive))
         change = np.diff(drive, prepend=surroundings.cold)
         direction = np.where(
             np.abs(change) > self.HOLD * surroundings.drive_range, np.sign(change), 0.0)
@@ -287,7 +283,26 @@ class Creep(MaterialEffect):
         if math.isfinite(phase):
             target = phase - 1.0
             self._modes = (target + (np.array(self._modes) - target) * decays).tolist()
-        strain = self.c / 100.0 * math.log(self.RATIO) * sum(self._modes)
+        return self._strain_of_modes(sum(self._modes), surroundings)
+
+    def _relaxed(self, inputs, surroundings):
+        """Return what `_relax` does for a whole trial, one relaxation after the other."""
+        self.start()
+        # Where the phase is not known, nothing relaxes.
+        decays = np.where(np.isfinite(inputs.phase)[:, None], self._decays(inputs.step), 1.0)
+        targets = np.nan_to_num(inputs.phase - 1.0).tolist()
+        total = np.zeros(len(targets))
+        for index, column in enumerate(decays.T.tolist()):
+            mode, course = self._modes[index], []
+            for target, decay in zip(targets, column):
+                mode = target + (mode - target) * decay
+                course.append(mode)
+            self._modes[index] = mode
+            total += course
+        return self._strain_of_modes(total, surroundings)
+
+    def _strain_of_modes(self, total, surroundings):
+        strain = self.c / 100.0 * math.log(self.RATIO) * total
         return -surroundings.sign * surroundings.length * strain
 
     def _strain(self, change, held, surroundings):
