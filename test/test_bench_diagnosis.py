@@ -8,6 +8,8 @@ import pytest
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.diagnosis import search
 from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.identification.effects import add_effects
 from hysteresis_ros.laboratory.linkage import GEOMETRY
@@ -63,6 +65,19 @@ def lagging(drive):
     return muscle(np.array(felt))
 
 
+def creeping(drive):
+    """Return the muscle with a part that follows within minutes, over two decades of time."""
+    wanted = muscle(drive)
+    total = wanted.copy()
+    for time in (5.0, 20.0, 80.0, 300.0):
+        state, part = 0.0, []
+        for value in wanted:
+            state = value + (state - value) * np.exp(-STEP / time)
+            part.append(state)
+        total += 0.06 * np.array(part)
+    return total
+
+
 def found_in(measurement, monkeypatch, names=('thermal_lag', 'fatigue', 'latency')):
     """Diagnose a table with the model of its own Preisach operator."""
     possible = search.possible
@@ -89,6 +104,32 @@ def test_a_lag_shows_without_an_arm(monkeypatch):
     found = found_in(table(lagging), monkeypatch)
     assert found.missing == ['thermal_lag']
     assert found.effects[0].values['time_constant'] == pytest.approx(8.0, rel=0.15)
+
+
+def test_creep_of_a_polymer_shows_and_is_plausible(monkeypatch):
+    """Steps so far all go on creeping; what follows the drive at once is the operator's."""
+    found = found_in(table(creeping), monkeypatch, ('creep', 'fatigue', 'latency'))
+    assert found.missing == ['creep']
+    assert found.effects[0].values['kept'] == 1.0
+    assert not found.effects[0].implausible()
+    assert found.rmse_after < 0.5 * found.rmse_before
+
+
+@pytest.mark.parametrize('name, values', [
+    ('creep', {'c': 0.3, 't0': 0.1, 'kept': 1.0}),
+    ('latent_heat', {'time_constant': 2.0, 'latent': 0.3})])
+def test_no_row_that_is_held_out_helps_to_predict_itself(name, values):
+    """An effect of the martensite share knows that share from the drive alone."""
+    measurement = table(muscle)
+    model = identify(measurement, operator='preisach', levels=(12, 12)).model
+    effect = catalogue()[name](model.surroundings).with_values(**values)
+    predicted = []
+    for change in (0.0, 0.002):
+        columns = dict(measurement.columns)
+        columns['length'] = columns['length'] + change * (columns['trial'] == 1.0)
+        problem = problem_for(model, [Measurement.from_columns(columns)])
+        predicted.append(problem.simulate([effect], problem.trial != 1))
+    np.testing.assert_allclose(*predicted, rtol=0.0, atol=1e-12)
 
 
 def test_the_elasticity_of_the_wire_is_added_to_what_the_bench_proves():

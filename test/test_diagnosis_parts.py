@@ -12,7 +12,8 @@ from hysteresis_ros.diagnosis.fit import Fitter
 from hysteresis_ros.diagnosis.candidates import consider, possible
 from hysteresis_ros.diagnosis.leftover import event_of, examine, flexible, lasting_step
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
-from hysteresis_ros.diagnosis.problem import problem_for, sensor_resolution
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.problem import sensor_resolution
 from hysteresis_ros.diagnosis.significance import (
     block_sums, cosines, family_p_values, flipped, gain_interval, held_out_errors,
     paired_p_values, residualise)

@@ -15,7 +15,7 @@ from hysteresis_ros.diagnosis import leftover, significance, structure
 from hysteresis_ros.diagnosis.candidates import present
 from hysteresis_ros.diagnosis.evidence import PRACTICAL
 from hysteresis_ros.diagnosis.fit import beside
-from hysteresis_ros.diagnosis.problem import problem_for
+from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.search import Search
 from hysteresis_ros.effects import catalogue
 

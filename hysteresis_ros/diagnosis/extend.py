@@ -10,7 +10,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.candidates import may_differ, present
 from hysteresis_ros.diagnosis.fit import Fitter
 from hysteresis_ros.diagnosis.parameters import starts_of
-from hysteresis_ros.diagnosis.problem import problem_for
+from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import ParameterError
 

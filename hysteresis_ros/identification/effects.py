@@ -11,7 +11,7 @@ from hysteresis_ros.diagnosis.evidence import PRACTICAL
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.fit import Fitter
 from hysteresis_ros.diagnosis.parameters import starts_of
-from hysteresis_ros.diagnosis.problem import problem_for
+from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, measure

@@ -1,0 +1,55 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Effects judged on runs of an arm, with the weights that the bench gave, frozen.
+
+Refitted weights would absorb most of what an effect does.
+"""
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.problem import Problem
+from hysteresis_ros.diagnosis.structure import Offset
+from hysteresis_ros.identification.operators import preisach_rows
+from hysteresis_ros.operators import Preisach
+
+
+class ArmProblem(Problem):
+    """Arm runs, simulated with the frozen weights of the bench."""
+
+    refits = False
+
+    def simulate(self, effects, train=None) -> np.ndarray:
+        """
+        Return the simulated response of the judged rows, shape (n,).
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        train : ndarray of bool, shape (n,), optional
+            Not used: nothing but the effects' own parameters is fitted here.
+        """
+        return self.pick([simulator.run(effects) for simulator in self.simulators])
+
+    def completed(self, effects):
+        """Return the model with these effects."""
+        return self.model.with_effects(effects)
+
+    def weight_columns(self, effects) -> np.ndarray:
+        """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""
+        stage = self.model.length_stage
+        if not isinstance(stage, Preisach):
+            return np.zeros((len(self.measured), 0))
+        step = 0.01 * self.model.surroundings.span
+        columns = []
+        for simulator, rows in zip(self.simulators, self.chosen):
+            inputs: list[np.ndarray] = []
+            base = simulator.run(effects, inputs)
+            moved = simulator.run([*effects, Offset(size=step)])
+            areas = np.concatenate([
+                np.apply_along_axis(lambda column: np.interp(
+                    np.arange(count), chosen, column), 0, preisach_rows(stage.nodes, u, True))
+                for u, chosen, count in inputs])
+            columns.append((((moved - base) / step)[:, None] * areas)[rows])
+        return np.concatenate(columns)

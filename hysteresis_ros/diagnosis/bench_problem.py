@@ -1,0 +1,246 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Effects judged on bench tables.
+
+A bench table is where the weights come from, so every set of effects gets weights of its own,
+fitted to the rows that are not held out.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.problem import Problem
+from hysteresis_ros.effects import SensorEffect
+from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.identification.least_squares import SLACK, fit_weights, quick_weights
+from hysteresis_ros.identification.operators import preisach_rows, smoothness
+from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.simulation import turning_rows
+from hysteresis_ros.operators import Preisach, cell_areas
+
+# Strength of the weights' regularisation at which sets of effects are compared: only so much that
+# the solution is unique. More of it bends the effects' own parameters.
+SEARCH_STRENGTH = 1e-8
+# A finer grid has to lower the held-out error by this share.
+WORTH = 0.02
+# How much finer than the model's the grid of H2 may be once its effects are known.
+FINER = 1.0, 1.5, 2.0
+
+
+@dataclasses.dataclass
+class Design:
+    """The least squares problem of H2's weights: areas (n, K), known part (n,), grid nodes."""
+
+    rows: np.ndarray
+    known: np.ndarray
+    nodes: np.ndarray
+
+
+@dataclasses.dataclass
+class Course:
+    """
+    What H2 is given in each trial, and what is done to its output.
+
+    `inputs` (rows + 1,) begin with the cold one; `scales` and `known` (rows,) multiply the output
+    above its least and are added to it.
+    """
+
+    inputs: list
+    scales: list
+    known: list
+
+
+class BenchProblem(Problem):
+    """Bench tables, with weights refitted to the training rows for every set of effects."""
+
+    refits = True
+
+    def __init__(self, model, measurements):
+        super().__init__(model, measurements)
+        stage = model.require_length_stage()
+        if not isinstance(stage, Preisach):
+            raise MeasurementError(f'effects on bench tables need a Preisach length stage, this '
+                                   f'model has a {stage.kind} one; identify it with --operator '
+                                   'two-stage or preisach')
+        self.levels = len(stage.nodes) - 1
+        self._passive = None
+        self._square = None
+        self._phases_of = self._known_phases = None
+
+    def _design(self, effects, levels=None, train=None) -> Design:
+        chain = Chain(effects, self.model.surroundings)
+        phases = None
+        if chain.needs_phase:
+            phases = self._phases(chain, [e for e in effects if not e.needs_phase], train)
+        course = self._course(chain, phases)
+        nodes = self._nodes(course, levels or self.levels)
+        picked = self._picked()
+        rows = np.concatenate([
+            _areas(nodes, part, keep) for part, keep in zip(course.inputs, picked)])
+        rows *= np.concatenate(
+            [scale[keep] for scale, keep in zip(course.scales, picked)])[:, None]
+        return Design(rows, np.concatenate(
+            [value[keep] for value, keep in zip(course.known, picked)]), nodes)
+
+    def _course(self, chain, phases) -> Course:
+        model = self.model
+        first = model.first_stage(chain)
+        cold = chain.to_heat(model.cold_drive)
+        course = Course([], [], [])
+        for number, trial in enumerate(self._trials()):
+            inputs = trial.inputs
+            if phases is not None:
+                inputs = inputs._replace(phase=phases[number])
+            heat = chain.heat(trial.drive, inputs)
+            first.reset()
+            x = first.simulate(np.concatenate(([cold], heat)))
+            load = chain.load_inside(trial.load) if first.loaded else 0.0 * trial.load
+            course.inputs.append(model.sign * (x - np.concatenate((load[:1], load))))
+            offset, factor = chain.drift(trial.drive, heat, inputs)
+            course.scales.append(chain.scale(trial.load) * factor)
+            course.known.append(chain.stretch(trial.load) + offset)
+        return course
+
+    def _trials(self) -> list:
+        return [trial for simulator in self.simulators for trial in simulator.trials]
+
+    @staticmethod
+    def _nodes(course, levels):
+        low = min(part.min() for part in course.inputs)
+        high = max(part.max() for part in course.inputs)
+        margin = 1e-6 * max(high - low, 1e-12)
+        return np.linspace(low - margin, high + margin, levels + 1)
+
+    def _picked(self) -> list:
+        """Judged rows of each trial, counted from the trial's first."""
+        picked = []
+        for simulator, chosen in zip(self.simulators, self.chosen):
+            for trial in simulator.trials:
+                inside = (chosen >= trial.rows.start) & (chosen < trial.rows.stop)
+                picked.append(chosen[inside] - trial.rows.start)
+        return picked
+
+    def _phases(self, chain, effects, train) -> list:
+        """
+        Return the martensite share in every row of each trial.
+
+        As a fit of the other effects to the training rows predicts it from the inputs; the
+        measured response would let an effect that follows the share predict rows from themselves.
+        """
+        key = (None if train is None else train.tobytes(),
+               *((effect.id, *effect.values.items()) for effect in effects))
+        if key != self._phases_of:
+            plain = Chain(effects, self.model.surroundings)
+            course = self._course(plain, None)
+            design = self._design(effects, train=train)
+            weights, _ = self._weights(design, train)
+            stage = _stage(design.nodes, weights, 0.0)
+            base = stage.output_range[0]
+            shown = []
+            for part, scale in zip(course.inputs, course.scales):
+                stage.reset()
+                stage.step(part[0])
+                shown.append(self.model.sign * scale * (stage.simulate(part[1:]) - base))
+            low, high = min(map(np.min, shown)), max(map(np.max, shown))
+            self._phases_of = key
+            self._known_phases = [(high - one) / max(high - low, 1e-300) for one in shown]
+        return self._known_phases
+
+    def fit_stage(self, effects, levels):
+        """
+        Fit H2's weights to all rows, their regularisation cross-validated over the trials.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        levels : int
+            Of H2.
+
+        Returns
+        -------
+        WeightFit, Design
+        """
+        design = self._design(effects, levels)
+        groups = self.trial if len(np.unique(self.trial)) > 1 else self.block
+        fit = fit_weights(
+            design.rows, self.measured - design.known, groups=groups, scale=_scale(design.nodes),
+            slack=SLACK, penalty=smoothness(design.nodes, reversible=True))
+        return fit, design
+
+    def simulate(self, effects, train=None) -> np.ndarray:
+        """Return the response of the judged rows, shape (n,), weights fitted to `train` (n,)."""
+        design = self._design(effects, train=train)
+        weights, bias = self._weights(design, train)
+        response = design.rows @ weights + bias + design.known
+        for effect in effects:
+            if isinstance(effect, SensorEffect):
+                response = self._sensed(effect, response)
+        return response
+
+    def _weights(self, design, train):
+        rows = slice(None) if train is None else train
+        # Neighbouring parameters have neighbouring weights.
+        weights, bias, self._passive = quick_weights(
+            design.rows[rows], (self.measured - design.known)[rows],
+            _scale(design.nodes), self._penalty(design.nodes), self._passive)
+        return weights, bias
+
+    def _penalty(self, nodes):
+        """Square of the penalty; it is the same for all grids of equal intervals."""
+        if self._square is None:
+            root = smoothness(nodes, reversible=True)
+            self._square = SEARCH_STRENGTH * root.T @ root
+        return self._square
+
+    def _sensed(self, effect, response):
+        sensed = response.copy()
+        for trial in np.unique(self.trial):
+            rows = self.trial == trial
+            inputs = self.simulators[0].trials[0].inputs._replace(
+                time=self.signals['time'][rows])
+            sensed[rows] = effect.forward(response[rows], inputs)
+        return sensed
+
+    def weight_columns(self, effects) -> np.ndarray:
+        """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""
+        return self._design(effects).rows
+
+    def completed(self, effects):
+        """
+        Return the model with these effects and H2's weights refitted to all rows.
+
+        What the effects explain no longer has to be smoothed over, so that the grid may be finer
+        where held-out rows say so.
+        """
+        best = None
+        for factor in FINER:
+            fit, design = self.fit_stage(effects, round(factor * self.levels))
+            if best is not None and fit.validation.min() > (1.0 - WORTH) * best[0].validation.min():
+                break
+            best = fit, design
+        fit, design = best
+        stage = _stage(design.nodes, fit.weights, fit.bias)
+        return dataclasses.replace(self.model, effects=list(effects), length_stage=stage)
+
+
+def _stage(nodes, weights, bias):
+    """Return the operator with weights of shape (K + N,); `bias` is its least output."""
+    count = len(cell_areas(nodes))
+    return Preisach(nodes, weights[:count], bias + float(weights @ _scale(nodes)), weights[count:])
+
+
+def _areas(nodes, part, keep):
+    """Areas above saturation, (rows, K + N), of the kept rows; the first input is the cold one."""
+    wanted = np.zeros(len(part), dtype=bool)
+    wanted[keep + 1] = True
+    needed = wanted | turning_rows(part)
+    rows = preisach_rows(nodes, part[needed], reversible=True) + _scale(nodes)
+    return rows[wanted[needed]]
+
+
+def _scale(nodes):
+    """Sizes of the cells and, for the reversible weights, of the intervals, shape (K + N,)."""
+    return np.append(cell_areas(nodes), np.diff(nodes))

@@ -1,0 +1,34 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which problem suits the kind of the measurements."""
+
+from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+from hysteresis_ros.diagnosis.bench_problem import BenchProblem
+from hysteresis_ros.diagnosis.problem import Problem
+from hysteresis_ros.errors import MeasurementError
+
+
+def problem_for(model, measurements) -> Problem:
+    """
+    Return the problem that suits the kind of the measurements.
+
+    Raises
+    ------
+    MeasurementError
+        If they are of kinds that cannot be judged together, or hold nothing to explain.
+    """
+    measurements = list(measurements)
+    if not measurements:
+        raise MeasurementError('no measurement was given; name CSV files or bag folders')
+    if all(m.kind == 'bench' for m in measurements):
+        measurements = [m for m in measurements if m.response != 'force']
+        if not measurements:
+            raise MeasurementError('a force table at resting length has no load to explain; give '
+                                   'the length table as well')
+    kinds = sorted({f'{m.kind} {m.response}' for m in measurements})
+    if len(kinds) > 1:
+        raise MeasurementError(f'the measurements are of several kinds ({", ".join(kinds)}); give '
+                               'either bench tables or arm runs')
+    if measurements[0].kind == 'bench':
+        return BenchProblem(model, measurements)
+    return ArmProblem(model, measurements)
