@@ -8,6 +8,7 @@ import pytest
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.diagnosis import search
 from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
@@ -130,6 +131,19 @@ def test_no_row_that_is_held_out_helps_to_predict_itself(name, values):
         problem = problem_for(model, [Measurement.from_columns(columns)])
         predicted.append(problem.simulate([effect], problem.trial != 1))
     np.testing.assert_allclose(*predicted, rtol=0.0, atol=1e-12)
+
+
+def test_an_extended_model_says_what_was_fitted():
+    """Weights and the martensite share that they show come into agreement, under any load."""
+    columns = table(creeping).columns
+    loads = np.repeat([5.0, 5.0, 10.0, 15.0], ROWS)
+    measurement = Measurement.from_columns({
+        **columns, 'force': loads, 'length': columns['length'] + 3e-4 * loads})
+    model = identify(measurement, operator='preisach', levels=(12, 12)).model
+    extended = extend(model, ['series_compliance', 'creep'], [measurement]).model
+    error = measurement.columns['length'] - extended.predict(measurement)
+    assert np.sqrt(np.mean(error ** 2)) < 0.015 * np.ptp(columns['length'])
+    assert abs(np.mean(error)) < 0.002 * np.ptp(columns['length'])
 
 
 def test_the_elasticity_of_the_wire_is_added_to_what_the_bench_proves():

@@ -17,7 +17,7 @@ from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights, quick_weights
 from hysteresis_ros.identification.operators import preisach_rows, smoothness
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.simulation import turning_rows
+from hysteresis_ros.model.simulation import PHASE_PASSES, turning_rows
 from hysteresis_ros.operators import Preisach, cell_areas
 
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
@@ -69,11 +69,10 @@ class BenchProblem(Problem):
         self._square = None
         self._phases_of = self._known_phases = None
 
-    def _design(self, effects, levels=None, train=None) -> Design:
+    def _design(self, effects, levels=None, train=None, phases=None) -> Design:
         chain = Chain(effects, self.model.surroundings)
-        phases = None
-        if chain.needs_phase:
-            phases = self._phases(chain, [e for e in effects if not e.needs_phase], train)
+        if chain.needs_phase and phases is None:
+            phases = self._phases([e for e in effects if not e.needs_phase], train)
         course = self._course(chain, phases)
         nodes = self._nodes(course, levels or self.levels)
         picked = self._picked()
@@ -122,7 +121,7 @@ class BenchProblem(Problem):
                 picked.append(chosen[inside] - trial.rows.start)
         return picked
 
-    def _phases(self, chain, effects, train) -> list:
+    def _phases(self, effects, train) -> list:
         """
         Return the martensite share in every row of each trial.
 
@@ -132,21 +131,21 @@ class BenchProblem(Problem):
         key = (None if train is None else train.tobytes(),
                *((effect.id, *effect.values.items()) for effect in effects))
         if key != self._phases_of:
-            plain = Chain(effects, self.model.surroundings)
-            course = self._course(plain, None)
             design = self._design(effects, train=train)
             weights, _ = self._weights(design, train)
-            stage = _stage(design.nodes, weights, 0.0)
-            base = stage.output_range[0]
-            shown = []
-            for part, scale in zip(course.inputs, course.scales):
-                stage.reset()
-                stage.step(part[0])
-                shown.append(self.model.sign * scale * (stage.simulate(part[1:]) - base))
-            low, high = min(map(np.min, shown)), max(map(np.max, shown))
+            self._known_phases = self._phases_with(effects, _stage(design.nodes, weights, 0.0))
             self._phases_of = key
-            self._known_phases = [(high - one) / max(high - low, 1e-300) for one in shown]
         return self._known_phases
+
+    def _phases_with(self, effects, stage, phases=None) -> list:
+        """Return the martensite share that H2 shows in every row of each trial."""
+        model = dataclasses.replace(self.model, length_stage=stage)
+        found = []
+        for part in self._course(Chain(effects, model.surroundings), phases).inputs:
+            stage.reset()
+            stage.step(part[0])
+            found.append(model.martensite(stage.simulate(part[1:])))
+        return found
 
     def fit_stage(self, effects, levels):
         """
@@ -163,11 +162,18 @@ class BenchProblem(Problem):
         -------
         WeightFit, Design
         """
-        design = self._design(effects, levels)
         groups = self.trial if len(np.unique(self.trial)) > 1 else self.block
-        fit = fit_weights(
-            design.rows, self.measured - design.known, groups=groups, scale=_scale(design.nodes),
-            slack=SLACK, penalty=smoothness(design.nodes, reversible=True))
+        phases, passes = None, PHASE_PASSES if any(e.needs_phase for e in effects) else 0
+        for remaining in range(passes, -1, -1):
+            design = self._design(effects, levels, phases=phases)
+            fit = fit_weights(
+                design.rows, self.measured - design.known, groups=groups,
+                scale=_scale(design.nodes), slack=SLACK,
+                penalty=smoothness(design.nodes, reversible=True))
+            if remaining:
+                # The share that these weights show is not quite that of those without the effect.
+                phases = self._phases_with(
+                    effects, _stage(design.nodes, fit.weights, fit.bias), phases)
         return fit, design
 
     def simulate(self, effects, train=None) -> np.ndarray:

@@ -149,26 +149,25 @@ class Simulator:
             inputs = trial.inputs
             if chain.needs_phase:
                 inputs = inputs._replace(phase=np.ones(len(trial.drive)))
-            response = respond(trial, inputs)
+            response, given = respond(trial, inputs)
             for _ in range(PHASE_PASSES if chain.needs_phase else 0):
-                inputs = inputs._replace(phase=self._phase(response))
-                response = respond(trial, inputs)
+                inputs = inputs._replace(phase=self._phase(given))
+                response, given = respond(trial, inputs)
             result[trial.rows] = response
         if len(self._remembered) >= REMEMBERED:
             del self._remembered[next(iter(self._remembered))]
         self._remembered[key] = result
         return result
 
-    def _phase(self, response):
-        """Martensite share as the response shows it."""
+    def _phase(self, given):
+        """Martensite share as the operator's output shows it."""
         if self.measurement.response == 'force':
             low, high = self.model.force_stage.output_range
-            return np.clip((high - response) / max(high - low, 1e-12), 0.0, 1.0)
-        if self.measurement.response == 'angle':
-            response = self.model.geometry.length(response)
-        return self.model.martensite(response)
+            return np.clip((high - given) / max(high - low, 1e-12), 0.0, 1.0)
+        return self.model.martensite(given)
 
     def _responder(self, chain, inputs_of_stage):
+        """Return what gives response and operator's output for a trial."""
         response = self.measurement.response
         if response == 'force':
             if self.model.force_stage is None:
@@ -179,8 +178,11 @@ class Simulator:
         first = self.model.first_stage(chain)
         if response == 'angle':
             balance = self.model.balance(chain)
-            return lambda trial, inputs: self._angle(
-                chain, first, balance, trial, inputs, inputs_of_stage)
+
+            def respond(trial, inputs):
+                angle = self._angle(chain, first, balance, trial, inputs, inputs_of_stage)
+                return angle, self.model.geometry.length(angle)
+            return respond
         stage = self.model.require_length_stage()
         return lambda trial, inputs: self._length(chain, first, stage, trial, inputs)
 
@@ -196,7 +198,8 @@ class Simulator:
         drive = chain.to_drive(chain.heat(trial.drive, inputs))
         operator.reset()
         operator.step(self.model.cold_drive)
-        return operator.simulate(drive)
+        force = operator.simulate(drive)
+        return force, force
 
     def _length(self, chain, first, stage, trial, inputs):
         model = self.model
@@ -208,7 +211,7 @@ class Simulator:
         base = stage.output_range[0]
         offset, factor = chain.drift(trial.drive, heat, inputs)
         return (base + chain.scale(trial.load) * factor * (output - base)
-                + chain.stretch(trial.load) + offset)
+                + chain.stretch(trial.load) + offset), output
 
     def _angle(self, chain, first, balance, trial, inputs, inputs_of_stage):
         cold, x, heat = self._first(chain, first, trial, inputs)
