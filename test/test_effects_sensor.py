@@ -52,6 +52,17 @@ def test_latency_gives_what_was_a_moment_ago():
     np.testing.assert_allclose(seen, [1.0, 1.0, 1.75, 3.5])
 
 
+def test_latency_shows_the_rest_before_a_trial_first():
+    late = effect('latency', delay=0.25)
+    late.start()
+    late.begin(3.0)
+    response, steps = np.array([1.0, 2.0, 4.0]), [0.1, 0.2, 0.2]
+    whole = late.forward(response, rows(steps))
+    np.testing.assert_allclose(whole, [3.0, 2.0, 1.75])
+    single = [late.step(value, step) for value, step in zip(response, steps)]
+    np.testing.assert_allclose(single, whole)
+
+
 @given(st.lists(st.tuples(st.floats(0.5, 2.5), st.floats(0.01, 1.0)), min_size=1, max_size=20),
        st.sampled_from(['encoder_offset', 'backlash', 'latency']))
 def test_row_by_row_is_the_same_as_the_whole_trial(samples, name):

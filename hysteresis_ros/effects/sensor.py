@@ -95,11 +95,20 @@ class Latency(SensorEffect):
 
     def forward(self, response, inputs):
         """Read the response of a moment ago."""
-        return np.interp(inputs.time - self.delay, inputs.time, response)
+        time = inputs.time
+        if self._past:
+            # Before the trial the muscle was at rest.
+            time = np.append(time[0] - inputs.step[0], time)
+            response = np.append(self._past[-1][1], response)
+        return np.interp(inputs.time - self.delay, time, response)
 
     def start(self):
         """Forget the past."""
         self._past = []
+
+    def begin(self, rest):
+        """See the state of rest until what follows it arrives."""
+        self._past = [[0.0, rest]]
 
     def step(self, value, step):
         """Interpolate in what was seen within the delay."""

@@ -179,6 +179,9 @@ class SensorEffect(Effect):
     stage = 'sensor'
     kinds = ('arm', 'bench')
 
+    def begin(self, rest: float) -> None:
+        """Take up the true response of the state of rest before a trial, after `start`."""
+
     def forward(self, response, inputs: Inputs):
         """Map the response of one trial, shape (rows,)."""
         if type(self).step is SensorEffect.step:

@@ -175,8 +175,11 @@ class Chain:
             offset, factor = offset + added, factor * times
         return offset, factor
 
-    def measured(self, response: np.ndarray, inputs: Inputs) -> np.ndarray:
-        """Return what the sensor says of the true response of one trial, shape (rows,)."""
+    def measured(self, response: np.ndarray, inputs: Inputs, rest: float | None) -> np.ndarray:
+        """Return what the sensor says of the true response of one trial (rows,) after a rest."""
         for effect in self.sensor:
+            effect.start()
+            if rest is not None:
+                effect.begin(rest)
             response = effect.forward(response, inputs)
         return response

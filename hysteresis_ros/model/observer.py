@@ -51,7 +51,9 @@ class Observer:
         self._chain.start()
         self._first.reset()
         self._balance.start()
-        self._balance.settle(self._first.step(float(self._chain.to_heat(cold))))
+        rest = self._balance.settle(self._first.step(float(self._chain.to_heat(cold))))
+        for effect in self._chain.sensor:
+            effect.begin(rest)
         self._time = time
         self._drive = cold
         self._phase = 1.0

@@ -106,7 +106,8 @@ class Simulator:
         self.measurement = measurement
         self.stride = 1 if measurement.settled else stride
         self.trials = trials_of(model, measurement)
-        self._remembered: dict[tuple, np.ndarray] = {}
+        self._remembered: dict[tuple, tuple] = {}
+        self._rest: float | None = None
 
     def run(self, effects, inputs_of_stage: list | None = None) -> np.ndarray:
         """
@@ -130,15 +131,20 @@ class Simulator:
             If the model lacks what this kind of measurement needs.
         """
         chain = Chain(effects, self.model.surroundings)
-        result = self._before_sensor(effects, chain, inputs_of_stage)
+        result, rest = self._before_sensor(effects, chain, inputs_of_stage)
         if chain.sensor:
             result = result.copy()
             for trial in self.trials:
-                result[trial.rows] = chain.measured(result[trial.rows], trial.inputs)
+                result[trial.rows] = chain.measured(
+                    result[trial.rows], trial.inputs, rest)
         return result
 
     def _before_sensor(self, effects, chain, inputs_of_stage):
-        """Return the true response; the last few are remembered, for fits of the sensor."""
+        """
+        Return the true response, and on an arm that of the rest before each trial.
+
+        The last few are remembered, for fits of the sensor.
+        """
         key = (self.stride, *((effect.id, *effect.values.items()) for effect in effects
                               if not isinstance(effect, SensorEffect)))
         if inputs_of_stage is None and key in self._remembered:
@@ -156,8 +162,8 @@ class Simulator:
             result[trial.rows] = response
         if len(self._remembered) >= REMEMBERED:
             del self._remembered[next(iter(self._remembered))]
-        self._remembered[key] = result
-        return result
+        self._remembered[key] = result, self._rest
+        return self._remembered[key]
 
     def _phase(self, given):
         """Martensite share as the operator's output shows it."""
@@ -220,7 +226,7 @@ class Simulator:
             trial.rows.start, cold, x, inputs.step if balance.has_dynamics else None)
         steps = np.diff(np.cumsum(inputs.step)[chosen], prepend=0.0).tolist()
         balance.start()
-        balance.settle(cold)
+        self._rest = balance.settle(cold)
         angles, stage_inputs = [], []
         for row in zip(x[chosen].tolist(), steps, offset[chosen].tolist(),
                        factor[chosen].tolist()):
