@@ -98,6 +98,15 @@ def test_what_is_added_has_to_take_off_a_share_of_the_first_error():
     assert search._matters(fit(0.20), fit(0.36))
 
 
+@pytest.mark.parametrize('base, left, goes_on', [
+    (1.0, 0.15, False), (1.0, 0.17, True), (10.0, 0.24, False), (10.0, 0.26, True)])
+def test_the_search_ends_where_what_is_left_could_not_matter(base, left, goes_on):
+    """Above 1.6 times a floor of 0.1, and by 1.5 % of the first error above the floor."""
+    search = searching(fit(base))
+    search.evidence = SimpleNamespace(floor=0.1, enough=0.16)
+    assert bool(search._leaves(fit(left))) == goes_on
+
+
 @pytest.mark.parametrize('contained, first', [('wide', 'narrow'), ('other', 'wide')])
 def test_an_effect_gives_way_to_one_that_it_contains_while_the_rest_may_be_chance(contained, first):
     """Not to one that has nothing to do with it, which is clearly worse."""

@@ -72,7 +72,7 @@ class BenchProblem(Problem):
     def _design(self, effects, levels=None, train=None, phases=None) -> Design:
         chain = Chain(effects, self.model.surroundings)
         if chain.needs_phase and phases is None:
-            phases = self._phases([e for e in effects if not e.needs_phase], train)
+            phases = self._phases(effects, train)
         course = self._course(chain, phases)
         nodes = self._nodes(course, levels or self.levels)
         picked = self._picked()
@@ -125,9 +125,10 @@ class BenchProblem(Problem):
         """
         Return the martensite share in every row of each trial.
 
-        As a fit of the other effects to the training rows predicts it from the inputs; the
+        As a fit of those effects that do not depend on it predicts it from the inputs; the
         measured response would let an effect that follows the share predict rows from themselves.
         """
+        effects = [effect for effect in effects if not effect.needs_phase]
         key = (None if train is None else train.tobytes(),
                *((effect.id, *effect.values.items()) for effect in effects))
         if key != self._phases_of:
@@ -163,7 +164,9 @@ class BenchProblem(Problem):
         WeightFit, Design
         """
         groups = self.trial if len(np.unique(self.trial)) > 1 else self.block
-        phases, passes = None, PHASE_PASSES if any(e.needs_phase for e in effects) else 0
+        phases, passes = None, 0
+        if any(effect.needs_phase for effect in effects):
+            phases, passes = self._phases(effects, None), PHASE_PASSES
         for remaining in range(passes, -1, -1):
             design = self._design(effects, levels, phases=phases)
             fit = fit_weights(
