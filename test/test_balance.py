@@ -10,7 +10,7 @@ import pytest
 from scipy import integrate, optimize
 
 from hysteresis_ros.bicep.balance import ArmBalance
-from hysteresis_ros.bicep.bundle import Bundle, ELASTICITY
+from hysteresis_ros.bicep.bundle import Bundle, COMPLIANCE
 from hysteresis_ros.effects import MaterialEffect
 from hysteresis_ros.operators import Linear
 from model_support import bicep_model, effect_of, GEOMETRY
@@ -324,23 +324,33 @@ def test_equal_muscles_in_parallel_are_one(names):
             one.step(x, 0.5, offset, 0.98), abs=1e-7)
 
 
-def test_unequal_muscles_share_the_load_of_brute_force():
+@pytest.mark.parametrize('yielding', [None, 0.3])
+def test_unequal_muscles_share_the_load_of_brute_force(yielding):
     offsets = (-0.8e-3, 0.0, 1.2e-3)
-    made = balance('unequal_muscles', shorter=0.8, longer=1.2)
+    names = {'unequal_muscles': {'shorter': 0.8, 'longer': 1.2}}
+    compliance = COMPLIANCE
+    if yielding:
+        names['series_compliance'] = {'compliance': yielding}
+        compliance = 1e-3 * yielding
+    model = MODEL.with_effects([effect_of(MODEL, name, **values)
+                                for name, values in names.items()])
+    made = model.balance(model.chain())
     stages = [MODEL.require_length_stage() for _ in offsets]
     for x in [0.5, *X]:
         def lacking(theta, commit=False, x=x):
+            load = GEOMETRY.force(theta)
+            stretch = compliance * load if yielding else 0.0
             total = 0.0
             for stage, excess in zip(stages, offsets):
-                wanted = GEOMETRY.length(theta) - excess
-                low, high = stage.output_range
-                u = optimize.brentq(lambda v, stage=stage, wanted=wanted: stage.peek(v) - min(
-                    max(wanted, low), high), stage.lower, stage.upper, xtol=1e-13)
-                u += ELASTICITY * (wanted - min(max(wanted, low), high))
+                def missing(u, stage=stage, excess=excess):
+                    # What a wire bears more than the mean stretches it, too.
+                    return (stage.peek(u) + compliance * (u + x - load)
+                            - (GEOMETRY.length(theta) - stretch - excess))
+                u = optimize.brentq(missing, -200.0, 200.0, xtol=1e-13)
                 total += max(u + x, 0.0)
                 if commit:
                     stage.step(u)
-            return GEOMETRY.force(theta) - total / 3.0
+            return load - total / 3.0
 
         theta = optimize.brentq(lacking, 0.9, 2.3, xtol=1e-12)
         lacking(theta, commit=True)
@@ -349,28 +359,37 @@ def test_unequal_muscles_share_the_load_of_brute_force():
 
 def test_friction_holds_unequal_muscles_by_what_they_pull_together():
     made = balance('unequal_muscles', 'coulomb_friction')
-    offsets = (-0.6e-3, 0.0, 0.9e-3)
     theta = made.step(6.0, 30.0)
     leverage = 3.0 * GEOMETRY.moment_arm(theta)
-    tensions = []
-    for operator, excess in zip(made.operators, offsets):
-        assert operator.output == pytest.approx(GEOMETRY.length(theta) - excess, abs=1e-7)
-        tensions.append(operator.input + 6.0)
-    assert np.mean(tensions) == pytest.approx(
-        (GEOMETRY.load_moment(theta) + 0.02) / leverage, abs=1e-4)
+    tension = np.mean([operator.input + 6.0 for operator in made.operators])
+    assert tension == pytest.approx((GEOMETRY.load_moment(theta) + 0.02) / leverage, abs=1e-4)
     width = 2.0 * 0.02 / leverage
-    assert made.step(6.0 - 0.98 * width, 30.0) == theta
-    assert made.step(6.0 - 1.02 * width, 30.0) > theta
+    stiff = [made.step(6.0 - share * width, 30.0) - theta for share in (0.3, 0.6, 0.9)]
+    assert stiff == [0.0, 0.0, 0.0]
+    # The wires yield while the arm sticks, but no more than the drive has changed.
+    tension = np.mean([operator.input + 6.0 - 0.9 * width for operator in made.operators])
+    rest = GEOMETRY.load_moment(theta) / leverage
+    assert rest - 0.5 * width < tension < rest
+    assert made.step(6.0 - 2.0 * width, 30.0) > theta
 
 
-@given(st.lists(st.floats(-20.0, 20.0), min_size=1, max_size=4), st.floats(0.01, 30.0))
-def test_drive_of_a_bundle_undoes_its_share(inputs, load):
-    bundle = Bundle(MODEL.require_length_stage(), (0.0,) * len(inputs))
-    assert bundle.share(inputs, bundle.drive(inputs, load)) == pytest.approx(load, rel=1e-9)
+@given(st.lists(st.floats(0.0, 2e-3), min_size=2, max_size=4), st.floats(0.5, 12.0),
+       st.floats(0.2, 0.8))
+def test_drive_of_a_bundle_undoes_its_share(offsets, load, share):
+    stage = MODEL.require_length_stage()
+    bundle = Bundle(stage, tuple(offsets), 1e-4)
+    low, high = stage.output_range
+    output = low + share * (high - low)
+    x = bundle.drive(output, load)
+    assert bundle.share(bundle.inputs(output, load - x), x) == pytest.approx(load, rel=1e-6)
 
 
 def test_bundle_stays_within_the_limits_of_its_search():
     bundle = Bundle(MODEL.require_length_stage(), (0.0, 1e-3))
-    assert bundle.settle(lambda output: 1e9, 0.0, -0.02, 0.0, -0.01) == 0.0
-    assert bundle.settle(lambda output: -1e9, 0.0, -0.02, 0.0, -0.01) == -0.02
-    assert bundle.settle(lambda output: 1e9, 0.0, -0.02, 0.0, 5.0) == 0.0
+
+    def place(load, near):
+        return bundle.settle(lambda output: (output, load), 0.0, -0.02, 0.0, near, 1e-3)[0]
+
+    assert place(1e9, -0.01) == 0.0
+    assert place(-1e9, -0.01) == -0.02
+    assert place(1e9, 5.0) == 0.0

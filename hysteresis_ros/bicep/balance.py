@@ -18,7 +18,7 @@ import math
 import numpy as np
 from scipy import optimize
 
-from hysteresis_ros.bicep.bundle import Bundle
+from hysteresis_ros.bicep.bundle import Bundle, USUAL_YIELD
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.bicep.root import bracket, illinois
 from hysteresis_ros.bicep.swing import Swing
@@ -74,7 +74,11 @@ class ArmBalance:
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
         self._heaviest = max(float(np.max(np.abs(statics.moment))), 1e-12)
         self._calm = CALM_STEP * (operator.upper - operator.lower)
-        self._bundle = Bundle(operator, chain.offsets) if len(chain.offsets) > 1 else None
+        self._bundle = None
+        if len(chain.offsets) > 1:
+            self._bundle = Bundle(operator, chain.offsets, chain.compliance())
+            # Whose wires yield when the drive changes, even while the arm sticks.
+            self._rigid = False
         self.operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self._swing = None
         if self.has_dynamics and loaded and self._bundle is None:
@@ -87,7 +91,7 @@ class ArmBalance:
         for operator in self.operators:
             operator.reset()
         self._gain = 1.5
-        self._angle = self._inputs = None
+        self._angle = None
         self._velocity, self._before = 0.0, None
         self._x = math.inf
         self._jerk = self._acceleration = 0.0
@@ -151,18 +155,16 @@ class ArmBalance:
 
     def _rest(self, line, x, offset, factor, dt):
         if self._bundle is None:
-            given = self._solve(line, x, offset, factor)
+            k, share = line.place(self._solve(line, x, offset, factor), offset)
         else:
-            given = self._solve_bundle(line, x, offset, factor, dt)
-        k, share = line.place(given, offset)
+            k, share = self._solve_bundle(line, x, offset, factor, dt)
         return self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
 
     def _direction(self, x, offset, factor, dt):
         """Direction in which the arm slides, 0 where friction holds it."""
         place = self._present()
         if self._rigid:
-            held = self._inputs or [self.operators[0].input]
-            tension = Bundle.share(held, x)
+            tension = max(self.operators[0].input + x, 0.0)
             if self._required(self._lines[1], *place, dt) > tension:
                 return 1
             return -1 if self._required(self._lines[-1], *place, dt) < tension else 0
@@ -176,7 +178,7 @@ class ArmBalance:
                     (self._lines[0].demand_at(*place, offset),
                      self._required(self._lines[0], *place, dt)),
                     (edge.demand_at(*place, offset), self._required(edge, *place, dt))))
-            found['inputs'] = self._inputs_at(self.base + demand / factor)
+            found['inputs'] = self._inputs_at(self.base + demand / factor, load - x)
             return load - Bundle.share(found['inputs'], x)
 
         if lacking(1.0) > 0.0:
@@ -188,16 +190,14 @@ class ArmBalance:
         self._commit(found['inputs'])
         return 0
 
-    def _inputs_at(self, output):
+    def _inputs_at(self, output, mean):
         if self._bundle is None:
             return [self.operators[0].solve(output)[0]]
-        return self._bundle.inputs(output)
+        return self._bundle.inputs(output, mean)
 
     def _commit(self, inputs):
         for operator, u in zip(self.operators, inputs):
             operator.step(u)
-        if self._bundle is not None:
-            self._inputs = inputs
 
     def _present(self):
         """Interval on the grid, and share of it, of the present angle."""
@@ -253,21 +253,27 @@ class ArmBalance:
         return factor * (operator.output - base)
 
     def _solve_bundle(self, line, x, offset, factor, dt):
-        """Commit the elongation in which muscles of unequal length balance the arm."""
-        bundle, base = self._bundle, self.base
-
-        def required(output):
-            return self._required(line, *line.place(factor * (output - base), offset), dt)
-
+        """Commit what unequal muscles do, and return the place on the grid where they balance."""
         last = len(self._theta) - 1
-        low = base + line.demand_at(1, 0.0, offset) / factor
-        high = base + line.demand_at(last, 1.0, offset) / factor
-        near = high
+
+        def split(place):
+            k = min(int(place), last - 1)
+            return k + 1, place - k
+
+        def state(place):
+            k, share = split(place)
+            output = self.base + line.demand_at(k, share, offset) / factor
+            return output, self._required(line, k, share, dt)
+
+        near = last
         if self._angle is not None:
-            near = base + line.demand_at(*self._present(), offset) / factor
-        output = bundle.settle(required, x, low, high, near)
-        self._commit(bundle.inputs(output))
-        return factor * (output - base)
+            k, share = self._present()
+            near = k - 1 + share
+        # Along the grid the muscles give way by about this much.
+        scale = USUAL_YIELD * last / (line.demand[-1] - line.demand[0])
+        place, inputs = self._bundle.settle(state, x, 0.0, last, near, scale)
+        self._commit(inputs)
+        return split(place)
 
 
 class _Line:

@@ -1,20 +1,23 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Parallel muscles of unequal length, which share the load as their own memories allow."""
+"""
+Parallel muscles of unequal length, which share the load as their own memories allow.
+
+A muscle that lacks dL_i is stretched further than the mean one and bears more. What it bears more
+stretches its wire elastically, too: ``H2[u_i] + c (u_i - u) = L - dL_i``, with c the compliance, u
+the input that goes with the mean load, and L what the transformation gives under that. A
+compliance is a reversible weight, so H2 with it has an exact inverse, which no plateau interrupts.
+"""
 
 import copy
-import math
 
-from scipy import optimize
+from hysteresis_ros.bicep.root import bracket, illinois
+from hysteresis_ros.operators import Preisach
 
-from hysteresis_ros.bicep.root import bracket
-
-# Force per elongation [N/m] of a wire that is wholly in one phase.
-ELASTICITY = 5e3
-# First step [m] of the search for the balance, at least; how exactly it is found [m].
-FIRST_STEP, EXACT = 1e-5, 1e-11
-# About how far the muscles go for a load that is missing [m/N].
-USUAL_GAIN = 1e-3
+# Compliance [m/N] of a wire whose own is not known.
+COMPLIANCE = 2e-4
+# About how far muscles go for a load that is missing [m/N], to begin a search with.
+USUAL_YIELD = 1e-3
 
 
 class Bundle:
@@ -26,29 +29,40 @@ class Bundle:
     operator : HysteresisOperator
         The second stage H2 of one muscle; it is copied for each.
     offsets : tuple of float
-        Excess length dL_i [m] of each muscle, so that it is stretched by ``L - dL_i``.
+        Excess length dL_i [m] of each muscle.
+    compliance : float
+        What a wire yields elastically [m/N]; 0 stands for a usual wire's.
     """
 
-    def __init__(self, operator, offsets):
-        self.operators = [copy.deepcopy(operator) for _ in offsets]
+    def __init__(self, operator, offsets, compliance: float = 0.0):
         self.offsets = offsets
+        self.tolerance = 1e-10 * (operator.upper - operator.lower)
+        self._compliance = compliance or COMPLIANCE
+        # Of other operators the wires are elastic only beyond what H2 can give.
+        self._inside = self._compliance if isinstance(operator, Preisach) else 0.0
+        self._middle = 0.5 * (operator.lower + operator.upper)
+        if self._inside:
+            operator = operator.tilted(self._inside)
+        self.operators = [copy.deepcopy(operator) for _ in offsets]
+        self._gain = 1.0
 
-    def reset(self) -> None:
-        """Wipe the memories."""
-        for operator in self.operators:
-            operator.reset()
-
-    def inputs(self, output: float) -> list[float]:
+    def inputs(self, output: float, mean: float) -> list[float]:
         """
-        Return each muscle's input ``u_i = F_i - x`` at the common elongation `output` [m].
+        Return each muscle's input ``u_i = F_i - x``.
 
-        Beyond what the transformation can give, only the wire's elasticity gives way.
+        Parameters
+        ----------
+        output : float
+            What the transformation gives under the mean load [m].
+        mean : float
+            Input that goes with the mean load [N].
         """
+        stretched = output + self._inside * (mean - self._middle)
         inputs = []
         for operator, excess in zip(self.operators, self.offsets):
-            wanted = output - excess
+            wanted = stretched - excess
             u, given, _ = operator.solve(wanted)
-            inputs.append(u + ELASTICITY * (wanted - given))
+            inputs.append(u + (wanted - given) / self._compliance)
         return inputs
 
     @staticmethod
@@ -56,45 +70,47 @@ class Bundle:
         """Return the mean load for each muscle's input; a wire cannot push."""
         return sum(max(u + x, 0.0) for u in inputs) / len(inputs)
 
-    def drive(self, inputs, load: float) -> float:
-        """Return the x under which the muscles together carry `load` each: `share` inverted."""
-        # The tightest muscles first, until the next one would not be slack any more.
-        tight = sorted(inputs, reverse=True)
-        total = 0.0
-        for count, u in enumerate(tight, start=1):
-            total += u
-            x = (load * len(tight) - total) / count
-            if count == len(tight) or tight[count] + x <= 0.0:
-                break
-        return x
+    def drive(self, output: float, load: float) -> float:
+        """Return the x [N] under which the muscles give `output` [m] and bear `load` [N] each."""
+        def lacking(x):
+            return load - self.share(self.inputs(output, load - x), x)
 
-    def settle(self, load, x: float, low: float, high: float, near: float) -> float:
+        middle = load - sum(operator.input for operator in self.operators) / len(self.operators)
+        return self._root(lacking, middle, 1.0)
+
+    def settle(self, state, x: float, low: float, high: float, near: float,
+               scale: float) -> tuple[float, list[float]]:
         """
-        Return the elongation in which the muscles carry what they have to; commits nothing.
+        Return where the muscles carry what they have to, and their inputs; commits nothing.
 
         Parameters
         ----------
-        load : callable
-            Load for each muscle at an elongation.
+        state : callable
+            Gives output [m] and load [N] for each muscle at a place; both never fall with it.
         x : float
             Output of the first stage.
         low, high, near : float
-            Limits of the elongation, and where to look first [m].
+            Limits of the place, and where to look first.
+        scale : float
+            About how far the place moves for 1 N that is missing.
         """
-        def lacking(output):
-            return load(output) - self.share(self.inputs(output), x)
+        found = []
 
-        near = min(max(near, low), high)
+        def lacking(place):
+            output, load = state(place)
+            found[:] = self.inputs(output, load - x)
+            return load - self.share(found, x)
+
+        # The last call of the search is at the place that it finds.
+        return self._root(lacking, min(max(near, low), high), scale, low, high), found
+
+    def _root(self, lacking, near, scale, *limits):
         here = lacking(near)
-        if here == 0.0:
+        if abs(here) <= self.tolerance:
             return near
-        step = math.copysign(max(abs(here) * USUAL_GAIN, FIRST_STEP), here)
-        near, here, far, there = bracket(lacking, near, here, step, low, high)
-        if here * there < 0.0:
-            far = optimize.brentq(lacking, near, far, xtol=EXACT, rtol=1e-14)
-        return far
-
-    def step(self, inputs) -> None:
-        """Commit each muscle's input."""
-        for operator, u in zip(self.operators, inputs):
-            operator.step(u)
+        points = bracket(lacking, near, here, scale * self._gain * here, *limits)
+        if points[1] * points[3] > 0.0:
+            return points[2]
+        found = illinois(lacking, *points, self.tolerance)
+        self._gain = min(max(abs((found - near) / (scale * here)), 0.01), 100.0)
+        return found

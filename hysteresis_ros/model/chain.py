@@ -159,6 +159,13 @@ class Chain:
         return sum((effect.stretch(load, self.surroundings) for effect in self.material),
                    0.0 * load)
 
+    def compliance(self) -> float:
+        """Return what a wire yields elastically, as the model knows it [m per unit of u]."""
+        load = self.surroundings.load or 1.0
+        yielded = self.stretch(np.float64(load)) - self.stretch(np.float64(0.0))
+        inside = self.load_inside(np.float64(load)) - self.load_inside(np.float64(0.0))
+        return max(float(yielded / max(inside, 1e-3 * load)), 0.0)
+
     def drift(self, drive, heat, inputs: Inputs) -> tuple[np.ndarray, np.ndarray]:
         """Return offset and factor of each row, each shape (rows,)."""
         offset, factor = np.zeros(len(drive)), np.ones(len(drive))

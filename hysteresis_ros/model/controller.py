@@ -105,7 +105,8 @@ class Controller:
         self._first = model.first_stage(self._chain)
         self._force = copy.deepcopy(model.force_stage)
         self._muscles = (None if model.length_stage is None else
-                         Muscles(model.require_length_stage(), model.sign, self._chain.offsets))
+                         Muscles(model.require_length_stage(), model.sign, self._chain.offsets,
+                                 self._chain.compliance()))
         self._pacing = Pacing(self._chain, self._clip, self._inputs, horizon)
         self._targets = (None if model.geometry is None else
                          Targets(model.geometry, self._chain, lambda: self._at_rest()[0]))

@@ -3,8 +3,9 @@
 """The second stage as a controller needs it: one muscle, or parallel ones of unequal length."""
 
 from collections.abc import Sequence
+import copy
 
-from hysteresis_ros.bicep.bundle import Bundle
+from hysteresis_ros.bicep.bundle import Bundle, USUAL_YIELD
 
 # Elongation [m] by which elastic wires may leave the range of the transformation.
 ELASTIC_ROOM = 0.02
@@ -22,22 +23,21 @@ class Muscles:
         -1 for muscles that contract when driven, 1 for one that extends.
     offsets : tuple of float
         Excess length [m] of each parallel muscle; one entry for equal muscles.
+    compliance : float
+        What a wire yields elastically [m/N].
     """
 
-    def __init__(self, operator, sign: int, offsets: tuple):
-        self._bundle = Bundle(operator, offsets)
-        self._operators = self._bundle.operators
+    def __init__(self, operator, sign: int, offsets: tuple, compliance: float):
+        self._bundle = Bundle(operator, offsets, compliance) if len(offsets) > 1 else None
+        self._operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self._sign = sign
         self.base, self._top = operator.output_range
         self._room = max(abs(excess) for excess in offsets) + ELASTIC_ROOM
 
-    @property
-    def _equal(self) -> bool:
-        return len(self._operators) == 1
-
     def reset(self) -> None:
         """Wipe the memory."""
-        self._bundle.reset()
+        for operator in self._operators:
+            operator.reset()
 
     def save(self) -> list:
         """Return the memory as plain types."""
@@ -71,20 +71,21 @@ class Muscles:
 
     def drive(self, output: float, load: float, dead_band: float = 0.0) -> tuple[float, bool]:
         """Return x for an output [m] under a load, and whether that output is out of reach."""
-        if not self._equal:
-            return self._bundle.drive(self._bundle.inputs(output), load), False
+        if self._bundle is not None:
+            return self._bundle.drive(output, load), False
         found = self._operators[0].invert(output, dead_band=dead_band)
         return self._sign * found.input + load, found.saturated
 
     def respond(self, x: float, load: float) -> tuple[float, list[float]]:
         """Return the output [m] and the inputs that `step` would commit."""
-        if self._equal:
+        if self._bundle is None:
             u = self._sign * (x - load)
             return self._operators[0].peek(u), [u]
-        output = self._bundle.settle(
-            lambda _: load, x, self.base - self._room, self._top + self._room, self.base)
-        return output, self._bundle.inputs(output)
+        return self._bundle.settle(
+            lambda output: (output, load), x, self.base - self._room, self._top + self._room,
+            self.base, USUAL_YIELD)
 
     def step(self, inputs: Sequence) -> None:
         """Commit each muscle's input."""
-        self._bundle.step(inputs)
+        for operator, u in zip(self._operators, inputs):
+            operator.step(u)

@@ -133,6 +133,8 @@ class Everett:
         row += slopes[None, :]
         column += slopes[:, None]
 
+        self._given = nodes, weights, slopes
+        self._tilted: dict[float, Everett] = {}
         self.total = float(corner[0, levels])
         self.nodes = nodes
         self._arrays = corner, row, column, density, half, slopes
@@ -154,6 +156,15 @@ class Everett:
     def __deepcopy__(self, memo: dict) -> 'Everett':
         """Return itself: nothing of it changes, and its tables are most of an operator."""
         return self
+
+    def tilted(self, slope: float) -> 'Everett':
+        """Return the function with `slope` added to every weight on the diagonal."""
+        if slope not in self._tilted:
+            # The tables cost as much as hundreds of steps, and the slope seldom changes.
+            self._tilted.clear()
+            nodes, weights, slopes = self._given
+            self._tilted[slope] = Everett(nodes, weights, slopes + slope)
+        return self._tilted[slope]
 
     def at(self, alpha: float, beta: float) -> float:
         """Return E at one point, nodes[0] <= beta <= alpha <= nodes[-1]."""

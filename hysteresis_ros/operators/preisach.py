@@ -9,6 +9,7 @@ corner and the present input (`everett`), so one stack of corners with the sums 
 them is the whole memory, and a step costs amortised constant time however long the history is.
 """
 
+import copy
 from typing import Any, Mapping
 
 import numpy as np
@@ -74,17 +75,38 @@ class Preisach(HysteresisOperator):
         self._sign = one_sign(
             np.concatenate((self.weights, self.reversible)), 'Preisach weights')
         # The output is base + sign * z with z from 0, all relays down, to span, all up.
-        self._everett = Everett(
-            self.nodes, 2.0 * np.abs(self.weights), 2.0 * np.abs(self.reversible))
-        self._span = self._everett.total
+        self._take(Everett(
+            self.nodes, 2.0 * np.abs(self.weights), 2.0 * np.abs(self.reversible)))
+        for array in (self.nodes, self.weights, self.reversible):
+            array.flags.writeable = False
+
+    def _take(self, everett: Everett) -> None:
+        """Take the weight as a function, and wipe the memory."""
+        self._everett = everett
+        self._span = everett.total
         self._base = self.bias - self._sign * self._span / 2.0
         if not self._span + abs(self._base) <= LARGEST:
             raise ParameterError(
                 f'Preisach operator: the output reaches beyond {LARGEST:g}, use another unit')
         self._tolerance = resolution(self.output_range)
-        for array in (self.nodes, self.weights, self.reversible):
-            array.flags.writeable = False
         self.reset()
+
+    def tilted(self, slope: float) -> 'Preisach':
+        """
+        Return the operator, its memory wiped, plus a line that is 0 in the middle of its range.
+
+        Parameters
+        ----------
+        slope : float
+            Not negative: how much steeper, in the direction of the weights. Unit of the output
+            over the unit of the input.
+
+        """
+        other = copy.copy(self)
+        other.reversible = self.reversible + 0.5 * self._sign * slope
+        other.reversible.flags.writeable = False
+        other._take(self._everett.tilted(slope))
+        return other
 
     def reset(self) -> None:
         """Forget the history: all relays down, input at `lower`."""
