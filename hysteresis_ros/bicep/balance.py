@@ -8,7 +8,8 @@ the first stage's output (H1[V] in the paper's model) and F is what the arm asks
 At rest ``L(theta) = H2[F(theta) - x]``; the unknown is u, because H2 then gives everything else.
 Dry friction lets F lie in a band, inside which the arm sticks; viscous friction and inertia add
 what the present velocity and acceleration cost (see `swing`): by backward differences, of second
-order over equal steps.
+order over equal steps, and while the arm rings by the method of Fox and Goodwin, Newmark's with
+beta = 1/12, whose phase is of fourth order.
 """
 
 import bisect
@@ -16,9 +17,8 @@ import copy
 import math
 
 import numpy as np
-from scipy import optimize
 
-from hysteresis_ros.bicep.bundle import Bundle, USUAL_YIELD
+from hysteresis_ros.bicep.bundle import Bundle, COMPLIANCE, USUAL_YIELD
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.bicep.root import bracket, illinois
 from hysteresis_ros.bicep.swing import Swing
@@ -28,13 +28,12 @@ from hysteresis_ros.effects.stages import Statics
 GRID = math.radians(0.1)
 # A step longer than this is a settled state to which dynamics contribute nothing.
 LONGEST_TRANSIENT = 5.0
-# Longest step that still shows how an arm rings (its period is about 0.5 s).
-LONGEST_INERTIAL_STEP = 0.034
+# Longest step of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
+# would not be stable.
+LONGEST_PHASE = 0.7
 # An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
 # of less than this share of H2's range, does not ring, and is followed in longer steps.
-CALM, CALM_STEP, FADING = 0.01, 0.01, 0.7
-# How exactly the share of its friction is known that an arm at rest makes use of.
-STUCK_TOLERANCE = 1e-10
+CALM, CALM_STEP, FADING = 0.005, 0.005, 0.7
 
 
 class ArmBalance:
@@ -72,6 +71,9 @@ class ArmBalance:
         self._rigid = all(line.demand == self._lines[0].demand for line in self._lines.values())
         self.has_dynamics = self.viscous > 0.0 or self.inertia > 0.0
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
+        # Where the wires only stretch the arm is stiffest, and rings fastest.
+        stiffness = float(np.max(leverage * statics.moment_arm)) / (chain.compliance() or COMPLIANCE)
+        self._longest = LONGEST_PHASE * math.sqrt(self.inertia / stiffness)
         self._heaviest = max(float(np.max(np.abs(statics.moment))), 1e-12)
         self._calm = CALM_STEP * (operator.upper - operator.lower)
         self._bundle = None
@@ -83,7 +85,7 @@ class ArmBalance:
         self._swing = None
         if self.has_dynamics and loaded and self._bundle is None:
             self._swing = Swing(statics, leverage, chain, self.base, self.viscous, self.inertia,
-                                1e3 * self.tolerance)
+                                1e4 * self.tolerance)
         self.start()
 
     def start(self) -> None:
@@ -93,7 +95,7 @@ class ArmBalance:
         self._gain = 1.5
         self._angle = None
         self._velocity, self._before = 0.0, None
-        self._x = math.inf
+        self._x, self._ringing = math.inf, False
         self._jerk = self._acceleration = 0.0
 
     def settle(self, x: float) -> float:
@@ -119,18 +121,29 @@ class ArmBalance:
         float
             Angle [rad].
         """
-        if self.inertia > 0.0 and LONGEST_INERTIAL_STEP < dt < LONGEST_TRANSIENT and (
-                abs(x - self._x) > self._calm or self._jerk > CALM):
-            pieces = math.ceil(dt / LONGEST_INERTIAL_STEP)
-            for _ in range(pieces - 1):
-                self._advance(x, dt / pieces, offset, factor)
-            dt /= pieces
+        pieces = 1
+        self._ringing = 0.0 < dt < LONGEST_TRANSIENT and self.inertia > 0.0 and (
+            abs(x - self._x) > self._calm or self._jerk > CALM)
+        if self._ringing:
+            pieces = math.ceil(dt / self._longest)
+            if self._swing is not None and x != self._x:
+                self._kick(x, offset, factor)
         self._x = x
-        angle = self._advance(x, dt, offset, factor)
+        for _ in range(pieces):
+            angle = self._advance(x, dt / pieces, offset, factor)
         # What rings is not accelerated for a moment in the middle of its way.
         self._jerk = max(self.inertia * abs(self._acceleration) / self._heaviest,
-                         FADING * self._jerk)
+                         FADING ** pieces * self._jerk)
         return angle
+
+    def _kick(self, x, offset, factor):
+        """Begin a step with the acceleration under a new x."""
+        # An arm that friction holds is not accelerated before it slides.
+        if self._angle is not None and (self._velocity or not self.coulomb):
+            drag = math.copysign(self.coulomb, self._velocity) if self._velocity else 0.0
+            self._acceleration = self._swing.acceleration(
+                self.operators[0], x, offset, factor, *self._present(),
+                drag + self.viscous * self._velocity)
 
     def _advance(self, x, dt, offset, factor):
         moving = self.has_dynamics and dt < LONGEST_TRANSIENT and self._angle is not None
@@ -168,26 +181,28 @@ class ArmBalance:
             if self._required(self._lines[1], *place, dt) > tension:
                 return 1
             return -1 if self._required(self._lines[-1], *place, dt) < tension else 0
-        found = {}
+        demands, loads = zip(*(
+            (line.demand_at(*place, offset), self._required(line, *place, dt))
+            for line in map(self._lines.__getitem__, (0, 1, -1))))
+        inputs = []
 
         def lacking(drag):
             # Between rest and sliding friction takes off a part of what it can.
-            edge, share = self._lines[1 if drag > 0.0 else -1], abs(drag)
-            demand, load = (
-                (1.0 - share) * rest + share * most for rest, most in zip(
-                    (self._lines[0].demand_at(*place, offset),
-                     self._required(self._lines[0], *place, dt)),
-                    (edge.demand_at(*place, offset), self._required(edge, *place, dt))))
-            found['inputs'] = self._inputs_at(self.base + demand / factor, load - x)
-            return load - Bundle.share(found['inputs'], x)
+            edge, share = 1 if drag > 0.0 else -1, abs(drag)
+            demand = demands[0] + share * (demands[edge] - demands[0])
+            load = loads[0] + share * (loads[edge] - loads[0])
+            inputs[:] = self._inputs_at(self.base + demand / factor, load - x)
+            return load - Bundle.share(inputs, x)
 
-        if lacking(1.0) > 0.0:
+        sinking = lacking(1.0)
+        if sinking > 0.0:
             return 1
-        if lacking(-1.0) < 0.0:
+        rising = lacking(-1.0)
+        if rising < 0.0:
             return -1
-        lacking(optimize.brentq(lacking, -1.0, 1.0, xtol=STUCK_TOLERANCE))
+        illinois(lacking, 1.0, sinking, -1.0, rising, self.tolerance)
         # The arm stands still, but its load has changed, and with it what the load does.
-        self._commit(found['inputs'])
+        self._commit(inputs)
         return 0
 
     def _inputs_at(self, output, mean):
@@ -217,8 +232,12 @@ class ArmBalance:
 
     def _moved(self, theta, dt):
         """Return velocity and acceleration where the arm gets to `theta` within `dt`."""
+        if self._ringing:
+            way = theta - self._angle - dt * self._velocity
+            acceleration = 12.0 * way / dt ** 2 - 5.0 * self._acceleration
+            return self._velocity + 0.5 * dt * (self._acceleration + acceleration), acceleration
         if self._before is not None and self._before[0] == dt:
-            # Two steps alike: of second order, so that what rings goes on ringing.
+            # Two steps alike: of second order.
             _, angle, velocity = self._before
             speed = (1.5 * theta - 2.0 * self._angle + 0.5 * angle) / dt
             return speed, (1.5 * speed - 2.0 * self._velocity + 0.5 * velocity) / dt

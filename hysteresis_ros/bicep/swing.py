@@ -14,12 +14,15 @@ import bisect
 import numpy as np
 from scipy import optimize
 
+from hysteresis_ros.bicep.bundle import USUAL_YIELD
 from hysteresis_ros.bicep.root import bracket, illinois
 
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
 # Least share of a load that is missing by which the load changes in a step.
 LEAST_GAIN = 1e-3
+# How exactly an elongation [m] is met.
+EXACT = 1e-9
 
 
 class Swing:
@@ -71,15 +74,19 @@ class Swing:
         moved : callable
             Gives velocity and acceleration for the angle that the step ends at.
         """
-        place = [1, 0.0]
+        # Friction and inertia are linear in the angle that the step ends at.
+        (speed, acceleration), (faster, jerked) = moved(0.0), moved(1.0)
+        drag = friction + self._viscous * speed + self._inertia * acceleration
+        slope = (self._viscous * (faster - speed)
+                 + self._inertia * (jerked - acceleration))
+        k, share = 1, 0.0
 
         # Its last call is at the u that is found.
         def residual(u):
-            load, stretch, scale = self._muscle(u + x)
-            length = (self._base + scale * factor * (operator.peek(u) - self._base) + stretch
-                      + offset)
-            place[0], place[1] = self._place(length)
-            return self._needed(*place, friction, moved) - load
+            nonlocal k, share
+            load, length = self._muscle(operator, u, x, offset, factor)
+            k, share = self._place(length)
+            return self._needed(k, share, drag, slope) - load
 
         u = operator.input
         here = residual(u)
@@ -90,22 +97,53 @@ class Swing:
             u = found
         if u + x < self._inside[0]:
             u = self._inside[0] - x
-            place[:] = self._fly(friction, moved)
+            k, share = self._fly(drag, slope)
         operator.step(u)
-        k, share = place
         return self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
 
-    def _muscle(self, inside):
-        """Return load, elastic elongation and factor of the stroke for the load inside."""
-        k = bisect.bisect_right(self._inside, inside, 1, LOADS - 1)
-        share = ((inside - self._inside[k - 1]) / (self._inside[k] - self._inside[k - 1]))
-        load = (k - 1 + share) * self._spacing
-        if share < 0.0:
-            # A loose muscle; the load goes on falling, so that the root can be found.
-            return load, self._stretch[0], self._scale[0]
-        stretch, scale = (table[k - 1] + share * (table[k] - table[k - 1])
-                          for table in (self._stretch, self._scale))
-        return load, stretch, scale
+    def acceleration(self, operator, x, offset, factor, k, share, drag) -> float:
+        """
+        Return the angular acceleration [rad/s^2] of an arm under a new x.
+
+        Parameters
+        ----------
+        operator, x, offset, factor
+            As for `step`.
+        k, share : int, float
+            Interval of the grid, and share of it, at which the arm is.
+        drag : float
+            Moment of friction [N m].
+        """
+        lengths = self._length
+        wanted = lengths[k - 1] + share * (lengths[k] - lengths[k - 1])
+
+        def lacking(u):
+            return wanted - self._muscle(operator, u, x, offset, factor)[1]
+
+        u = operator.input
+        here = lacking(u)
+        if here != 0.0:
+            points = bracket(lacking, u, here, here / USUAL_YIELD, self._inside[0] - x,
+                             self._inside[-1] - x)
+            u = points[2]
+            if points[1] * points[3] < 0.0:
+                u = illinois(lacking, *points, EXACT)
+        load = self._muscle(operator, u, x, offset, factor)[0]
+        leverage = self._leverage[k - 1] + share * (self._leverage[k] - self._leverage[k - 1])
+        return (self._needed(k, share, drag, 0.0) - load) * leverage / self._inertia
+
+    def _muscle(self, operator, u, x, offset, factor):
+        """Return the load of the muscle and its elongation."""
+        insides, stretches, scales = self._inside, self._stretch, self._scale
+        n = bisect.bisect_right(insides, u + x, 1, LOADS - 1)
+        part = (u + x - insides[n - 1]) / (insides[n] - insides[n - 1])
+        load = (n - 1 + part) * self._spacing
+        # A loose muscle's load goes on falling, so that the root can be found.
+        part = max(part, 0.0)
+        stretch = stretches[n - 1] + part * (stretches[n] - stretches[n - 1])
+        scale = scales[n - 1] + part * (scales[n] - scales[n - 1])
+        return load, (self._base + scale * factor * (operator.peek(u) - self._base) + stretch
+                      + offset)
 
     def _place(self, length):
         """Return interval on the grid of angles, and share of it, at an elongation."""
@@ -114,21 +152,22 @@ class Swing:
         share = (length - lengths[k - 1]) / (lengths[k] - lengths[k - 1])
         return k, min(max(share, 0.0), 1.0)
 
-    def _needed(self, k, share, friction, moved):
+    def _needed(self, k, share, drag, slope):
         """Return the load that the arm asks for at a place where the step may end."""
-        theta = self._theta[k - 1] + share * (self._theta[k] - self._theta[k - 1])
-        speed, acceleration = moved(theta)
-        moment = self._moment[k - 1] + share * (self._moment[k] - self._moment[k - 1])
-        leverage = self._leverage[k - 1] + share * (self._leverage[k] - self._leverage[k - 1])
-        return (moment - friction - self._viscous * speed - self._inertia * acceleration) / leverage
+        theta, moment, leverage = self._theta, self._moment, self._leverage
+        before = k - 1
+        angle = theta[before] + share * (theta[k] - theta[before])
+        held = moment[before] + share * (moment[k] - moment[before])
+        return (held - drag - slope * angle) / (
+            leverage[before] + share * (leverage[k] - leverage[before]))
 
-    def _fly(self, friction, moved):
+    def _fly(self, drag, slope):
         """Return the place of an arm without a pull."""
         last = len(self._theta) - 1
 
         def needed(position):
             k = min(int(position), last - 1)
-            return self._needed(k + 1, position - k, friction, moved)
+            return self._needed(k + 1, position - k, drag, slope)
 
         if needed(0.0) <= 0.0:
             return 1, 0.0

@@ -71,9 +71,9 @@ class Inertia(MechanismEffect):
     invertible = False
     parameters = (
         Parameter('I', 'kg m^2', 'moment of inertia about the pivot', 0.001, 0.1, 0.0,
-                  (0.01,), log=True),
+                  (0.006, 0.015, 0.04), log=True),
         Parameter('b', 'N m s/rad', 'moment per angular velocity, by which the ringing dies away',
-                  0.001, 4.0, 0.0, (0.02,), log=True),)
+                  0.001, 4.0, 0.0, (0.05,), log=True),)
 
     def resistance(self):
         """Return viscous coefficient and moment of inertia."""

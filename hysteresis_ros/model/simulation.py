@@ -17,9 +17,8 @@ HOLD = 30.0
 PHASE_PASSES = 2
 # True responses that are kept.
 REMEMBERED = 4
-# Steps, as shares of the first stage's range, that are a jump, and that set an arm in motion;
-# its dynamics show for so long after those [s].
-JUMP, FAST, AFTER_FAST = 0.03, 0.005, 4.0
+# Step, as a share of the first stage's range, that is a jump.
+JUMP = 0.03
 # Change of that step from one row to the next that is the end of a ramp.
 BEND = 0.003
 
@@ -97,8 +96,7 @@ class Simulator:
     stride : int
         In a continuous arm run only every `stride`-th row of the table is balanced, and every row
         at which the first stage jumps, bends or turns round, so that the memory stays exact; rows
-        between are interpolated. An arm with inertia or viscous friction is balanced in every row
-        for a while after it moved fast.
+        between are interpolated. An arm with inertia or viscous friction is balanced in every row.
     """
 
     def __init__(self, model, measurement, stride: int = 1):
@@ -222,8 +220,8 @@ class Simulator:
     def _angle(self, chain, first, balance, trial, inputs, inputs_of_stage):
         cold, x, heat = self._first(chain, first, trial, inputs)
         offset, factor = chain.drift(trial.drive, heat, inputs)
-        chosen = self._chosen_rows(
-            trial.rows.start, cold, x, inputs.step if balance.has_dynamics else None)
+        chosen = (np.arange(len(x)) if self.stride == 1 or balance.has_dynamics
+                  else self._chosen_rows(trial.rows.start, cold, x))
         steps = np.diff(np.cumsum(inputs.step)[chosen], prepend=0.0).tolist()
         balance.start()
         self._rest = balance.settle(cold)
@@ -238,20 +236,12 @@ class Simulator:
             return np.array(angles)
         return np.interp(inputs.time, inputs.time[chosen], angles)
 
-    def _chosen_rows(self, start, cold, x, steps):
+    def _chosen_rows(self, start, cold, x):
         rows = np.arange(len(x))
-        if self.stride == 1:
-            return rows
         keep = ((start + rows) % self.stride == 0) | turning_rows(x)
         change = np.abs(np.diff(x, prepend=cold)) / max(np.ptp(x), 1e-12)
         # A jump is seen from both sides, so that nothing is interpolated over it.
         jump = change > JUMP
-        if steps is not None:
-            # An arm with dynamics rings or creeps after it moved fast, and every row shows it.
-            time = np.cumsum(steps)
-            jump = change > FAST
-            last = np.maximum.accumulate(np.where(jump, time, -np.inf))
-            keep |= time - last < AFTER_FAST
         keep |= jump
         keep[:-1] |= jump[1:]
         # Where a ramp begins or ends, a straight line between the rows beside it would miss it.
