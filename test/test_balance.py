@@ -238,6 +238,19 @@ def test_motion_is_that_of_the_equation_of_motion(
     assert np.max(np.abs(seen - true(time)[0])) < tolerance * stroke
 
 
+@pytest.mark.parametrize('inertia, viscous', [(0.003, 0.002), (0.03, 0.02)])
+def test_many_swings_keep_their_phase_and_size_at_ten_samples_a_second(inertia, viscous):
+    made = reversible_balance(inertia={'I': inertia, 'b': viscous},
+                              series_compliance={'compliance': 0.1})
+    start = made.settle(4.0)
+    true = free_arm(6.0, 4.0, viscous, inertia, start, 0.1e-3)
+    time = 0.1 * np.arange(1, 41)
+    seen = np.array([made.step(6.0, 0.1) for _ in time])
+    swings = true(time)[0]
+    assert np.ptp(swings[20:]) > 0.005 * np.ptp(swings)
+    assert np.max(np.abs(seen - swings)) < 0.03 * np.ptp(swings)
+
+
 @pytest.mark.parametrize('start, x, side', [(4.0, 8.0, -1.0), (8.0, 4.0, 1.0)])
 def test_dry_friction_is_against_the_motion(start, x, side):
     """Creeping along, the muscle holds the moment less or more the friction's."""

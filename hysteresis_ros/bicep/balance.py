@@ -33,7 +33,7 @@ LONGEST_TRANSIENT = 5.0
 LONGEST_PHASE = 0.7
 # An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
 # of less than this share of H2's range, does not ring, and is followed in longer steps.
-CALM, CALM_STEP, FADING = 0.005, 0.005, 0.7
+CALM, CALM_STEP, FADING = 0.005, 0.005, 0.97
 
 
 class ArmBalance:
