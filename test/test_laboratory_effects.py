@@ -276,6 +276,16 @@ def test_viscous_friction_slows_the_arm():
     assert slow[-1] == pytest.approx(quick[-1], abs=0.06)
 
 
+def test_a_cooled_wire_hangs_loose_instead_of_pushing_a_slow_arm():
+    """Then only the weight moves it, against the friction."""
+    arm, linkage = calm(viscous=2.5), Linkage()
+    run(arm, np.full(100, 6.0))
+    angles = run(arm, np.zeros(20))
+    speeds = np.diff(angles) / 0.1
+    assert np.all(speeds > 0.0)
+    assert np.all(speeds <= max(map(linkage.moment, angles)) / 2.5 + 0.01)
+
+
 def test_inertia_rings():
     """After a step the arm swings through, at the pulsation of its spring and mass."""
     arm = calm(inertia=0.03)

@@ -17,12 +17,14 @@ from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights, quick_weights
 from hysteresis_ros.identification.operators import preisach_rows, smoothness
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.simulation import PHASE_PASSES, turning_rows
+from hysteresis_ros.model.simulation import turning_rows
 from hysteresis_ros.operators import Preisach, cell_areas
 
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
 # the solution is unique. More of it bends the effects' own parameters.
 SEARCH_STRENGTH = 1e-8
+# How often weights and the martensite share that they show are fitted to each other.
+PHASE_PASSES = 2
 # A finer grid has to lower the held-out error by this share.
 WORTH = 0.02
 # How much finer than the model's the grid of H2 may be once its effects are known.

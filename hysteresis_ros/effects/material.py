@@ -205,7 +205,8 @@ class Creep(MaterialEffect):
     id = 'creep'
     sentence = 'After a step the muscle goes on moving the same way, with the logarithm of time.'
     equation = ('L += c l0 dxi ln(1 + t / t0), t since the last step and dxi the change of the '
-                'martensite share by it; where kept is 1, summed over all steps so far')
+                'martensite share by it, and that of the steps before, which fades with '
+                'exp(-t / t0); where kept is 1, the logarithms of all steps so far')
     source = "logarithmic creep of what has just transformed; Boltzmann's superposition (kept = 1)"
     shows_in = 'log time in a hold'
     experiment = 'holds of 300 s'
@@ -219,11 +220,11 @@ class Creep(MaterialEffect):
                   0.5, 0.0, (0.03, 0.15), log=True),
         Parameter('t0', 's', 'time from which the logarithm counts', 0.005, 300.0, 3.0, (3.0,),
                   log=True),
-        Parameter('kept', '1', '0: a step ends the creep of the one before, as in a transformation;'
+        Parameter('kept', '1', '0: a step lets the creep of those before fade, as in a transformation;'
                   ' 1: it goes on, as in a polymer', 0.0, 1.0, 0.0, (0.0, 1.0),
                   choices=(0.0, 1.0)),)
 
-    memory = ('_since', '_drive', '_phase', '_before', '_direction', '_modes')
+    memory = ('_since', '_drive', '_phase', '_before', '_direction', '_crept', '_left', '_modes')
 
     # The logarithm as a sum of relaxations, each this many times slower than the one before.
     MODES, RATIO = 6, 3.0
@@ -235,7 +236,7 @@ class Creep(MaterialEffect):
         """Forget the past: cold, before the first step."""
         self._since = self._drive = None
         self._phase = self._before = 1.0
-        self._direction = 0.0
+        self._direction = self._crept = self._left = 0.0
         self._modes = [0.0] * self.MODES
 
     def advance(self, drive, heat, inputs, surroundings):
@@ -247,15 +248,18 @@ class Creep(MaterialEffect):
         direction = 0.0
         if abs(change) > self.HOLD * surroundings.drive_range:
             direction = math.copysign(1.0, change)
+        self._left *= math.exp(-inputs.step / self.t0)
         if direction != 0.0:
             if direction != self._direction:
                 self._before = self._phase
+                self._left += self._crept
             self._since = inputs.time
         self._direction, self._drive, self._phase = direction, drive, inputs.phase
         if self._since is None:
             return 0.0, 1.0
-        strain = self._strain(inputs.phase - self._before, inputs.time - self._since, surroundings)
-        return float(strain), 1.0
+        self._crept = float(self._strain(
+            inputs.phase - self._before, inputs.time - self._since, surroundings))
+        return self._left + self._crept, 1.0
 
     def drift(self, drive, heat, inputs, surroundings):
         """Return the same for a whole trial at once."""
@@ -270,7 +274,18 @@ class Creep(MaterialEffect):
         begun = np.maximum.accumulate(np.where(turned, rows, 0))
         before = np.concatenate(([1.0], inputs.phase))[begun]
         held = np.where(last >= 0, inputs.time - inputs.time[last], 0.0)
-        return self._strain(inputs.phase - before, held, surroundings), np.ones(len(drive))
+        strain = self._strain(inputs.phase - before, held, surroundings)
+        return strain + self._fading(strain, np.flatnonzero(turned), inputs), np.ones(len(drive))
+
+    def _fading(self, strain, begun, inputs):
+        """Return what earlier runs of the drive have left, given the rows where runs begin."""
+        left, carried = np.zeros(len(strain)), 0.0
+        clock = np.cumsum(inputs.step)
+        for row, end in zip(begun, [*begun[1:], len(strain)]):
+            if row > 0:
+                carried = left[row - 1] * math.exp(-inputs.step[row] / self.t0) + strain[row - 1]
+            left[row:end] = carried * np.exp((clock[row] - clock[row:end]) / self.t0)
+        return left
 
     def _decays(self, step):
         """Return the share of each relaxation that is left after `step` [s], (rows, modes)."""

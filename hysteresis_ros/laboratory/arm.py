@@ -220,6 +220,9 @@ class Arm:
             self.angle = self._find(
                 lambda theta: linkage.elongation(theta) - wire.elongation(
                     temperature, tension(theta)), guess, LOWEST_ANGLE, highest)
+            if needed(self.angle) < 0.0:
+                # A wire that has got longer than that hangs loose and does not push the arm.
+                self.angle = self._find(lambda theta: -needed(theta), guess, LOWEST_ANGLE, highest)
             self.tensions = [tension(self.angle)]
         else:
             # The last evaluation, which leaves the tensions behind, is at the angle found.

@@ -13,8 +13,9 @@ from hysteresis_ros.model.chain import Chain
 
 # Rows of a settled table without times are this far apart [s] (Sec. III-A).
 HOLD = 30.0
-# Passes that bring an effect that depends on the phase into agreement with the phase it causes.
-PHASE_PASSES = 2
+# Passes at most that bring an effect that depends on the phase into agreement with the phase it
+# causes, to this share of martensite, with steps of at least this part of the difference.
+PHASE_PASSES, AGREEMENT, SHORTEST = 10, 2e-3, 0.2
 # True responses that are kept.
 REMEMBERED = 4
 # Step, as a share of the first stage's range, that is a jump.
@@ -150,18 +151,31 @@ class Simulator:
         result = np.empty(self.measurement.rows)
         respond = self._responder(chain, inputs_of_stage)
         for trial in self.trials:
-            inputs = trial.inputs
-            if chain.needs_phase:
-                inputs = inputs._replace(phase=np.ones(len(trial.drive)))
-            response, given = respond(trial, inputs)
-            for _ in range(PHASE_PASSES if chain.needs_phase else 0):
-                inputs = inputs._replace(phase=self._phase(given))
-                response, given = respond(trial, inputs)
-            result[trial.rows] = response
+            run = self._agree if chain.needs_phase else self._once
+            result[trial.rows] = run(respond, trial)
         if len(self._remembered) >= REMEMBERED:
             del self._remembered[next(iter(self._remembered))]
         self._remembered[key] = result, self._rest
         return self._remembered[key]
+
+    @staticmethod
+    def _once(respond, trial):
+        return respond(trial, trial.inputs)[0]
+
+    def _agree(self, respond, trial):
+        """Return the response with the phase that it has itself, by Aitken's relaxation."""
+        phase, left, part = np.ones(len(trial.drive)), None, 1.0
+        for _ in range(PHASE_PASSES):
+            response, given = respond(trial, trial.inputs._replace(phase=phase))
+            before, left = left, self._phase(given) - phase
+            if np.sqrt(np.mean(left ** 2)) < AGREEMENT:
+                break
+            if before is not None:
+                change = left - before
+                part *= -float(before @ change) / max(float(change @ change), 1e-300)
+                part = min(max(part, SHORTEST), 1.0)
+            phase = phase + part * left
+        return response
 
     def _phase(self, given):
         """Martensite share as the operator's output shows it."""
