@@ -220,8 +220,8 @@ class Creep(MaterialEffect):
                   0.5, 0.0, (0.03, 0.15), log=True),
         Parameter('t0', 's', 'time from which the logarithm counts', 0.005, 300.0, 3.0, (3.0,),
                   log=True),
-        Parameter('kept', '1', '0: a step lets the creep of those before fade, as in a transformation;'
-                  ' 1: it goes on, as in a polymer', 0.0, 1.0, 0.0, (0.0, 1.0),
+        Parameter('kept', '1', '0: a step lets the creep of those before fade, as in a '
+                  'transformation; 1: it goes on, as in a polymer', 0.0, 1.0, 0.0, (0.0, 1.0),
                   choices=(0.0, 1.0)),)
 
     memory = ('_since', '_drive', '_phase', '_before', '_direction', '_crept', '_left', '_modes')
