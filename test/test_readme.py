@@ -18,6 +18,9 @@ from hysteresis_ros.effects import catalogue
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.measurements.csv import write_csv
 
+# What `--effects auto` finds on a bench.
+EFFECTS = 'stress_dependence', 'stress_dependent_strain', 'series_compliance'
+
 
 @pytest.fixture(scope='module')
 def readme(root):
@@ -46,7 +49,7 @@ def test_the_commands_of_the_readme_work_one_after_the_other(
     said = {}
     for command in commands:
         # Effects of the bench are found in a test of their own; here they are named.
-        arguments = ['stress_dependence,stress_dependent_strain' if word == 'auto' else word
+        arguments = [','.join(EFFECTS) if word == 'auto' else word
                      for word in command[1:]]
         if arguments[0] == 'diagnose':
             arguments += ['--jobs', '1']

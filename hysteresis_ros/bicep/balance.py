@@ -72,7 +72,7 @@ class ArmBalance:
         self.has_dynamics = self.viscous > 0.0 or self.inertia > 0.0
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
         # Where the wires only stretch the arm is stiffest, and rings fastest.
-        stiffness = float(np.max(leverage * statics.moment_arm)) / (chain.compliance() or COMPLIANCE)
+        stiffness = np.max(leverage * statics.moment_arm) / (chain.compliance() or COMPLIANCE)
         self._longest = LONGEST_PHASE * math.sqrt(self.inertia / stiffness)
         self._heaviest = max(float(np.max(np.abs(statics.moment))), 1e-12)
         self._calm = CALM_STEP * (operator.upper - operator.lower)
