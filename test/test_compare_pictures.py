@@ -11,7 +11,8 @@ from hypothesis import given, strategies
 from hysteresis_ros.diagnosis import page
 from hysteresis_ros.diagnosis.compare import compare
 from hysteresis_ros.diagnosis.compare_page import comparison_page, rendered, summary, trials
-from hysteresis_ros.diagnosis.plots import along, figures, new_figure, png, thinned
+from hysteresis_ros.diagnosis.drawing import new_figure, png, thinned
+from hysteresis_ros.diagnosis.plots import along, figures
 from hysteresis_ros.measurements import Measurement
 import numpy as np
 import pytest

@@ -258,7 +258,7 @@ def find_and_extend(args, folder, model, sequences, data, hidden, pace, result):
 
 def draw(path, sequences, runs, linear, again, pace):
     """Save the picture: targets and angles reached, and the errors."""
-    from hysteresis_ros.diagnosis.plots import new_figure, png
+    from hysteresis_ros.diagnosis.drawing import new_figure, png
 
     made = new_figure(10.0, 5.6, 2, len(sequences), sharex='col')
     figure, axes = made[0], np.asarray(made[1]).reshape(2, -1)

@@ -135,6 +135,9 @@ def _in_parallel(tasks, jobs):
 
 def consider_all(fitter, known, current: Fit, names, jobs: int, progress) -> list[Candidate]:
     """Try every effect named, in parallel; see `consider`."""
+    # What takes longest begins first, so that no process has to wait for it: an arm in motion.
+    names = sorted(names, key=lambda name: (
+        not catalogue()[name].needs_transients, catalogue()[name].stage != 'mechanism'))
     tasks = [joblib.delayed(consider)(fitter, known, current, name) for name in names]
     found = []
     for candidate in progress(_in_parallel(tasks, jobs), len(names)):

@@ -4,7 +4,7 @@
 
 from hysteresis_ros import __version__
 from hysteresis_ros.diagnosis import page
-from hysteresis_ros.diagnosis.plots import png
+from hysteresis_ros.diagnosis.drawing import png
 from hysteresis_ros.diagnosis.where import number
 from hysteresis_ros.measurements.quantities import shown
 

@@ -10,7 +10,8 @@ from hysteresis_ros import __version__
 from hysteresis_ros.diagnosis import page
 from hysteresis_ros.diagnosis.compare import compare
 from hysteresis_ros.diagnosis.compare_page import CAPTIONS
-from hysteresis_ros.diagnosis.plots import figures, new_figure, png
+from hysteresis_ros.diagnosis.drawing import new_figure, png
+from hysteresis_ros.diagnosis.plots import figures
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.where import number
 from hysteresis_ros.diagnosis.words import verdict_in_words
