@@ -116,7 +116,8 @@ def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
     others = [effect for effect in known if effect.id not in kind.replaces]
     effect = present(problem.model, kind)
     with np.errstate(all='ignore'):
-        fit = fitter.search(problem.model.effects, others, effect)
+        fit = fitter.search(
+            problem.model.effects, others, effect, fitter.error(current.predicted))
         fit = fitter.cross_validate(problem.model.effects, fit)
     if _finite(fit) is None:
         return None

@@ -117,13 +117,16 @@ class Evidence:
         gains = significance.block_sums(before ** 2 - after ** 2, block)
         return bool(np.mean(gains > 0.0) >= CONSISTENT)
 
+    def _fitted(self, fit) -> float:
+        return mean_square(self.problem.measured - fit.predicted)
+
     def could_be(self, rival, chosen) -> bool:
         """
         Whether a rival could be the truth although the chosen fit is better.
 
-        If the rival were the truth, the data would be its response with the base model's error;
-        how far behind would it then fall by chance? A test of models that do not contain each
-        other, by simulation.
+        It could if it fits all rows as well with no more parameters. Else, if the rival were the
+        truth, the data would be its response with the base model's error; how far behind would
+        it then fall by chance? A test of models that do not contain each other, by simulation.
         """
         problem = self.problem
         left, best = (problem.measured - fit.held_out for fit in (rival, chosen))
@@ -135,6 +138,10 @@ class Evidence:
             return low <= 0.0
         if mean_square(left) > 4.0 * max(self.floor ** 2, mean_square(best)):
             return False
+        if (len(rival.vector) <= len(chosen.vector)
+                and self._fitted(rival) <= self._fitted(chosen)):
+            # A drift that fits all of it may foretell the last trial badly from those before.
+            return True
         own = significance.held_out_errors(rival.jacobian, self.decoys, problem.fold)
         shift = rival.predicted - chosen.predicted
         other = significance.held_out_errors(chosen.jacobian, self.decoys + shift, problem.fold)

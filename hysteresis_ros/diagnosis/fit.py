@@ -16,8 +16,11 @@ DIFFERENCE = 0.02
 FOLLOWED_STARTS = 2
 WORTH_FOLLOWING = 2.0
 FIRST_EVALUATIONS = 4
-MOST_EVALUATIONS = 8
+MOST_EVALUATIONS = 20
+# What has not taken this share off the error by then is not followed any further.
+PROMISING = 0.02
 HELD_OUT_EVALUATIONS = 3
+MOST_HALVINGS = 4
 # The base model's own error bends an estimate by up to about this share.
 ESTIMATE_SLACK = 0.15
 
@@ -145,7 +148,7 @@ class Fitter:
         return Fit(parameters.with_vector(found.x), found.x, full(found.x), derivatives,
                    converged=found.status > 0)
 
-    def search(self, fixed, known, effect, rows=None) -> Fit:
+    def search(self, fixed, known, effect, without: float = np.inf, rows=None) -> Fit:
         """
         Fit `effect` together with the `known` ones, from the best of its starts.
 
@@ -153,6 +156,8 @@ class Fitter:
         ----------
         fixed, rows
             As for `fit`.
+        without : float
+            Error without the effect; what does not promise less is not fitted to the end.
         known : sequence of Effect
             Effects found before, fitted again beside the new one.
         effect : Effect
@@ -173,12 +178,13 @@ class Fitter:
             starts.append(effect)
         errors = [error(start) for start in starts]
         order = np.argsort(errors, kind='stable')
-        # Beside others only the best is fitted to the end, by whoever chooses it.
         followed = [starts[index] for index in order[:1 if known else FOLLOWED_STARTS]
                     if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
         fits = [self.fit(fixed, [*known, start], rows, FIRST_EVALUATIONS) for start in followed]
         best = min(fits, key=lambda fit: self.error(fit.predicted, mask))
-        return best if best.converged or known else self.fit(fixed, best.effects, rows)
+        if best.converged or self.error(best.predicted, mask) > (1.0 - PROMISING) * without:
+            return best
+        return self.fit(fixed, best.effects, rows)
 
     def error(self, predicted, rows=slice(None)) -> float:
         """Root mean square error of some rows."""
@@ -189,7 +195,7 @@ class Fitter:
         Fill in `held_out`: every fold predicted by a fit to the others, simulated anew.
 
         The fit to all rows is the start; where the effects' parameters are all that is fitted, a
-        Gauss-Newton step from there is as good as a new search.
+        Gauss-Newton step from there is as good as a new search, if it is no longer than it helps.
         """
         problem = self.problem
         held_out = np.empty(len(problem.measured))
@@ -200,19 +206,26 @@ class Fitter:
                 refit = self.fit(fixed, fit.effects, ~test, HELD_OUT_EVALUATIONS)
                 held_out[test] = refit.predicted[test]
                 continue
-            vector = fit.vector
-            if len(vector):
-                jacobian = fit.jacobian[~test]
-                error = (problem.measured - fit.predicted)[~test]
-                ridge = 1e-6 * np.trace(jacobian.T @ jacobian) / len(vector) + 1e-300
-                step = np.linalg.solve(
-                    jacobian.T @ jacobian + ridge * np.eye(len(vector)), jacobian.T @ error)
-                vector = np.clip(vector + np.clip(step, -1.0, 1.0), parameters.lower,
-                                 parameters.upper)
-            predicted = problem.simulate(
-                [*beside(fixed, fit.effects), *parameters.with_vector(vector)])
-            held_out[test] = predicted[test]
+            held_out[test] = self._stepped(fixed, fit, parameters, ~test)[test]
         return dataclasses.replace(fit, held_out=held_out)
+
+    def _stepped(self, fixed, fit, parameters, train):
+        """Return the response after a Gauss-Newton step towards the rows to train on."""
+        if len(fit.vector) == 0:
+            return fit.predicted
+        jacobian, error = fit.jacobian[train], (self.problem.measured - fit.predicted)[train]
+        gram = jacobian.T @ jacobian
+        ridge = 1e-6 * np.trace(gram) / len(gram) + 1e-300
+        step = np.clip(np.linalg.solve(
+            gram + ridge * np.eye(len(gram)), jacobian.T @ error), -1.0, 1.0)
+        for _ in range(MOST_HALVINGS):
+            vector = np.clip(fit.vector + step, parameters.lower, parameters.upper)
+            predicted = self.problem.simulate(
+                [*beside(fixed, fit.effects), *parameters.with_vector(vector)])
+            if self.error(predicted, train) <= self.error(fit.predicted, train):
+                return predicted
+            step = 0.5 * step
+        return fit.predicted
 
     def with_intervals(self, fit: Fit, level: float = 0.95) -> list:
         """

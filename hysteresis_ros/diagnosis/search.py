@@ -39,6 +39,10 @@ RIVALS = 6
 MOST_ALTERNATIVES = 3
 
 
+def _names(effects) -> frozenset:
+    return frozenset(effect.id for effect in effects)
+
+
 class Search:
     """
     What explains a recording, as far as the catalogue goes.
@@ -79,6 +83,8 @@ class Search:
         self.evidence = Evidence(problem, self.fixed, self.base.predicted, self.rng)
         self.rivals = []
         self._changes = {}
+        # Fits of one more effect beside those that were known, by their names.
+        self._beside = {}
         names, self.hopeless = possible(problem, [])
         self.first = self.consider([], self.base, names)
 
@@ -96,6 +102,7 @@ class Search:
         values = self.evidence.p_values([candidate.fit for candidate in candidates], current)
         for candidate, value in zip(candidates, values):
             candidate.p_value = float(value)
+        self._beside[_names(known)] = [candidate.fit for candidate in candidates]
         return candidates
 
     def run(self) -> None:
@@ -118,12 +125,13 @@ class Search:
         taken = {effect.id for effect in self.found.effects}
         for effect in self.found.effects:
             others = [other for other in self.found.effects if other is not effect]
-            left = [candidate for candidate in self.first if candidate.id not in taken]
+            rivals = [fit for fit in self._beside.get(_names(others), [])
+                      if fit.effects[-1].id not in taken]
             if others:
-                sets = self._in_order([[*others, candidate.effect] for candidate in left])
-                rivals = consider_sets(self.fitter, sets[:RIVALS], self.jobs, self.progress)
-            else:
-                rivals = [candidate.fit for candidate in left]
+                fitted = {fit.effects[-1].id for fit in rivals} | taken
+                sets = self._in_order([[*others, candidate.effect] for candidate in self.first
+                                       if candidate.id not in fitted])
+                rivals += consider_sets(self.fitter, sets[:RIVALS], self.jobs, self.progress)
             close = [fit for fit in sorted(rivals, key=self.error) if not fit.implausible()
                      and self.evidence.could_be(fit, self.found)]
             result.append([fit.effects[-1].id for fit in close[:MOST_ALTERNATIVES]])
@@ -222,10 +230,27 @@ class Search:
         """Effects that have anything to say about what is left, the most promising first."""
         left = self.problem.measured - fit.predicted
         limit = (1.0 - PRACTICAL) * float(np.mean(left ** 2))
-        worth = {candidate.id: self._straight([fit.jacobian, self._change_of(candidate)], left)
-                 for candidate in self.first}
+        known = {effect.id for effect in fit.effects}
+        # A single column more cannot explain much by chance, and a drift that is foretold for a
+        # trial would count against whatever stands beside it.
+        worth = {candidate.id: min(
+            float(np.mean(significance.residualise(np.hstack([fit.jacobian, change]), left) ** 2))
+            for change in self._changes_beside(fit, candidate))
+                 for candidate in self.first if candidate.id not in known}
         names = [name for name in sorted(worth, key=worth.get) if worth[name] < limit]
         return names[:MOST_RIVALS]
+
+    def _changes_beside(self, fit, candidate) -> list:
+        """Return what an effect changes beside others, shape (n, 1), from each of its starts."""
+        effect = present(self.problem.model, catalogue()[candidate.id])
+        changes = []
+        with np.errstate(all='ignore'):
+            for start in [*starts_of(effect, self.problem.kind), candidate.effect]:
+                together = [*fit.effects, start]
+                change = self.problem.simulate(
+                    [*beside(self.fixed, together), *together]) - fit.predicted
+                changes.append(np.where(np.isfinite(change), change, 0.0)[:, None])
+        return changes
 
     def _straight(self, columns, left) -> float:
         """Return the held-out mean square error of a straight extrapolation."""
