@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The statistics and the bookkeeping that a diagnosis is made of, each against its definition."""
 
+import dataclasses
+
 from hypothesis import given, strategies as st
 from model_support import bicep_model, effect_of, STRENGTHS, wandering_voltage
 import numpy as np
@@ -337,6 +339,38 @@ def test_the_fit_finds_a_planted_payload(problem):
     assert fitter.error(fit.held_out) < 1e-3
     assert fitter.error(fitter.problem.simulate([])) > 0.02
     assert fit.implausible() == []
+
+
+def test_a_fold_is_predicted_by_a_step_no_longer_than_it_helps(problem):
+    """A straight line leads astray where the response bends."""
+    fitter = Fitter(problem)
+    payload = effect_of(problem.model, 'payload_error', dm=15.0)
+    fit = fitter.fit([], [payload], evaluations=1)
+    # Far from the minimum, with derivatives that are four times too small: a step of 1 at most.
+    fit = dataclasses.replace(fit, jacobian=0.25 * fit.jacobian)
+    held_out = fitter.cross_validate([], fit).held_out
+    for fold in problem.folds:
+        train = problem.fold != fold
+        step = fitter._stepped([], fit, ParameterVector(fit.effects, 'arm'), train)
+        assert fitter.error(step, train) <= fitter.error(fit.predicted, train)
+        assert np.array_equal(step[~train], held_out[~train])
+
+
+def test_what_promises_nothing_is_not_fitted_to_the_end(problem, monkeypatch):
+    """It is followed for a few steps, and further where it takes anything off the error."""
+    fitter = Fitter(problem)
+    asked = []
+    fit = fitter.fit
+
+    def counting(fixed, effects, rows=None, evaluations=20):
+        asked.append(evaluations)
+        return dataclasses.replace(fit(fixed, effects, rows, evaluations), converged=False)
+    monkeypatch.setattr(fitter, 'fit', counting)
+    effect = catalogue()['payload_error'](problem.model.surroundings)
+    fitter.search([], [], effect, without=1e-9)
+    assert set(asked) == {4}
+    fitter.search([], [], effect, without=10.0)
+    assert asked[-1] == 20
 
 
 def test_the_noise_of_a_sensor_comes_from_its_steps():

@@ -12,6 +12,7 @@ from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import LinearModel, Simulator
+from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.simulation import trials_of, turning_rows
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY, STRENGTHS, wandering_voltage
 
@@ -162,6 +163,29 @@ def test_phase_is_in_agreement_with_the_response_it_causes():
     assert np.all((phase > 0.0) & (phase < 1.0))
     felt = np.array([3.5, 4.0, 2.5]) * np.sqrt(1.0 / (1.0 + 0.05 * phase))
     np.testing.assert_allclose(model.predict(arm_run(felt)), angles, atol=math.radians(0.05))
+
+
+@pytest.mark.parametrize('name, values', [
+    ('latent_heat', {'time_constant': 3.0, 'latent': 0.6}), ('creep', {'c': 0.3, 't0': 2.0})])
+def test_a_strong_effect_of_the_phase_agrees_with_the_phase_it_causes(name, values):
+    """Latent heat works against its cause, so that plain repetition would swing to and fro."""
+    model = bicep_model()
+    effect = effect_of(model, name, **values)
+    simulator = Simulator(model, arm_run(VOLTAGE, 0.1))
+    angles = simulator.run([effect])
+    trial, = simulator.trials
+    phase = model.martensite(GEOMETRY.length(angles))
+    respond = simulator._responder(Chain([effect], model.surroundings), None)
+    again, _ = respond(trial, trial.inputs._replace(phase=phase))
+    assert np.sqrt(np.mean((again - angles) ** 2)) < math.radians(0.1)
+
+
+@pytest.mark.parametrize('name', ['viscous_friction', 'inertia'])
+def test_an_arm_in_motion_is_never_strided(name):
+    model = bicep_model([name])
+    run = arm_run(VOLTAGE, 0.1)
+    np.testing.assert_array_equal(
+        Simulator(model, run, stride=10).run(model.effects), model.predict(run))
 
 
 def test_martensite_is_the_long_phase_of_a_muscle_that_contracts():

@@ -68,6 +68,41 @@ def test_a_rival_that_is_hardly_worse_could_be_the_truth(error, possible):
     assert evidence().could_be(fit(error, column), fit(0.1, column)) == possible
 
 
+def test_a_rival_that_fits_all_rows_as_well_could_be_the_truth():
+    """It may foretell a held-out trial badly; one with more parameters has to be better there."""
+    column = CHANCE.standard_normal((ROWS, 1))
+    chosen, rival = fit(0.1, column), fit(0.09, column)
+    rival.held_out = fit(0.19, column).held_out
+    # So exact is the base model that chance explains nothing.
+    assert evidence(1e-6).could_be(rival, chosen)
+    rival.vector = np.zeros(2)
+    assert not evidence(1e-6).could_be(rival, chosen)
+    rival.vector, rival.predicted = np.zeros(1), fit(0.11).predicted
+    assert not evidence(1e-6).could_be(rival, chosen)
+
+
+def test_what_was_fitted_beside_the_others_is_not_fitted_again(monkeypatch):
+    """Alternatives are among those, and among the most promising of the rest."""
+    asked = []
+
+    def consider_sets(fitter, sets, jobs, progress):
+        asked.append([one[-1].id for one in sets])
+        return []
+    monkeypatch.setattr('hysteresis_ros.diagnosis.search.consider_sets', consider_sets)
+    monkeypatch.setattr(Fit, 'implausible', lambda self: [])
+    search = searching(fit(1.0))
+    search.found = fit(0.1, names=('sag', 'rub'))
+    search.rivals, search.jobs, search.progress = [], 1, None
+    search.first = [SimpleNamespace(id=name, effect=SimpleNamespace(id=name))
+                    for name in ('sag', 'rub', 'air', 'room', 'tilt')]
+    search._in_order = list
+    search._beside = {frozenset({'sag'}): [
+        fit(0.102, names=('sag', 'air')), fit(0.5, names=('sag', 'room')),
+        fit(0.1, names=('sag', 'rub'))]}
+    assert search.alternatives() == [[], ['air']]
+    assert asked == [['air', 'room', 'tilt'], ['tilt']]
+
+
 def test_a_whole_set_that_could_be_the_truth_is_named_place_by_place():
     """An effect of it that is known already stays where it is; nothing is named twice."""
     search = object.__new__(Search)
