@@ -16,7 +16,8 @@ DIFFERENCE = 0.02
 FOLLOWED_STARTS = 2
 WORTH_FOLLOWING = 2.0
 FIRST_EVALUATIONS = 4
-MOST_EVALUATIONS = 20
+# By whether weights are fitted again for every one, which takes much longer.
+MOST_EVALUATIONS = {True: 8, False: 20}
 # What has not taken this share off the error by then is not followed any further.
 PROMISING = 0.02
 HELD_OUT_EVALUATIONS = 3
@@ -89,7 +90,7 @@ class Fitter:
             return self.problem.simulate(kept + parameters.with_vector(vector), train)
         return respond
 
-    def fit(self, fixed, effects, rows=None, evaluations=MOST_EVALUATIONS) -> Fit:
+    def fit(self, fixed, effects, rows=None, evaluations=None) -> Fit:
         """
         Fit from the present values of `effects`.
 
@@ -101,8 +102,8 @@ class Fitter:
             Effects to fit; their values are the start.
         rows : ndarray of bool, shape (n,), optional
             Rows to fit; all by default.
-        evaluations : int
-            Steps of the optimiser at most.
+        evaluations : int, optional
+            Steps of the optimiser at most; by default enough to converge.
 
         Returns
         -------
@@ -142,7 +143,8 @@ class Fitter:
             lambda vector: (full(vector)[rows] - measured) / scale, start,
             jac=lambda vector: jacobian(vector)[rows] / scale,
             bounds=(parameters.lower, parameters.upper), method='trf', x_scale=1.0,
-            xtol=1e-3, ftol=1e-4, gtol=1e-8, max_nfev=evaluations)
+            xtol=1e-3, ftol=1e-4, gtol=1e-8,
+            max_nfev=evaluations or MOST_EVALUATIONS[problem.refits])
         # The optimiser has the derivatives of the rows it was given.
         derivatives = found.jac * scale if np.all(rows) else jacobian(found.x)
         return Fit(parameters.with_vector(found.x), found.x, full(found.x), derivatives,
