@@ -172,12 +172,16 @@ def _try_set(fitter, effects) -> Fit | None:
 
 
 def _consider_set(fitter, effects) -> Fit | None:
-    """Fit some effects together from either start, and cross-validate the better fit."""
+    """Fit some effects together from the better start, and cross-validate the fit."""
     problem = fitter.problem
+    # Which start is the better one shows soon, but for weights that are refitted.
+    first = None if problem.refits else FIRST_EVALUATIONS
     with np.errstate(all='ignore'):
-        fits = [fitter.fit(problem.model.effects, start)
+        fits = [fitter.fit(problem.model.effects, start, evaluations=first)
                 for start in _starts(effects, problem.kind)]
         best = min(fits, key=lambda fit: fitter.error(fit.predicted))
+        if not (best.converged or problem.refits):
+            best = fitter.fit(problem.model.effects, best.effects)
         return _finite(fitter.cross_validate(problem.model.effects, best))
 
 

@@ -143,7 +143,7 @@ class Fitter:
             lambda vector: (full(vector)[rows] - measured) / scale, start,
             jac=lambda vector: jacobian(vector)[rows] / scale,
             bounds=(parameters.lower, parameters.upper), method='trf', x_scale=1.0,
-            xtol=1e-3, ftol=1e-4, gtol=1e-8,
+            xtol=1e-3, ftol=1e-3, gtol=1e-8,
             max_nfev=evaluations or MOST_EVALUATIONS[problem.refits])
         # The optimiser has the derivatives of the rows it was given.
         derivatives = found.jac * scale if np.all(rows) else jacobian(found.x)
