@@ -65,6 +65,11 @@ class Chain:
         return next((e.offsets for e in self.material if len(e.offsets) > 1), (0.0,))
 
     @property
+    def moves(self) -> bool:
+        """Whether the arm's own velocity or acceleration counts."""
+        return any(any(effect.resistance()[1:]) for effect in self.mechanism)
+
+    @property
     def drifts(self) -> bool:
         """Whether time or history add to the elongation."""
         return any(type(effect).drift is not MaterialEffect.drift

@@ -16,6 +16,8 @@ HOLD = 30.0
 # Passes at most that bring an effect that depends on the phase into agreement with the phase it
 # causes, to this share of martensite, with steps of at least this part of the difference.
 PHASE_PASSES, AGREEMENT, SHORTEST = 10, 2e-3, 0.2
+# The same for an arm in motion, which is balanced in every row.
+MOVING_PASSES = 4
 # True responses that are kept.
 REMEMBERED = 4
 # Step, as a share of the first stage's range, that is a jump.
@@ -151,21 +153,20 @@ class Simulator:
         result = np.empty(self.measurement.rows)
         respond = self._responder(chain, inputs_of_stage)
         for trial in self.trials:
-            run = self._agree if chain.needs_phase else self._once
-            result[trial.rows] = run(respond, trial)
+            if chain.needs_phase:
+                result[trial.rows] = self._agree(
+                    respond, trial, MOVING_PASSES if chain.moves else PHASE_PASSES)
+            else:
+                result[trial.rows], _ = respond(trial, trial.inputs)
         if len(self._remembered) >= REMEMBERED:
             del self._remembered[next(iter(self._remembered))]
         self._remembered[key] = result, self._rest
         return self._remembered[key]
 
-    @staticmethod
-    def _once(respond, trial):
-        return respond(trial, trial.inputs)[0]
-
-    def _agree(self, respond, trial):
+    def _agree(self, respond, trial, passes):
         """Return the response with the phase that it has itself, by Aitken's relaxation."""
         phase, left, part = np.ones(len(trial.drive)), None, 1.0
-        for _ in range(PHASE_PASSES):
+        for _ in range(passes):
             response, given = respond(trial, trial.inputs._replace(phase=phase))
             before, left = left, self._phase(given) - phase
             if np.sqrt(np.mean(left ** 2)) < AGREEMENT:
