@@ -406,3 +406,17 @@ def test_bundle_stays_within_the_limits_of_its_search():
     assert place(1e9, -0.01) == 0.0
     assert place(-1e9, -0.01) == -0.02
     assert place(1e9, 5.0) == 0.0
+
+
+def test_a_wire_that_hardly_yields_does_not_cut_time_into_endless_pieces():
+    model = MODEL.with_effects([effect_of(MODEL, 'series_compliance', compliance=1e-290),
+                                effect_of(MODEL, 'inertia', I=0.01)])
+    chain = model.chain()
+    assert chain.compliance() == 0.0
+    made = model.balance(chain)
+    made.settle(0.5)
+    assert math.isfinite(made.step(8.0, 0.1))
+    light = balance('inertia', I=1e-200, b=0.02)
+    assert light.step(8.0, 0.1) == pytest.approx(balance('viscous_friction', b=0.02).step(8.0, 0.1))
+    stiff = MODEL.with_effects([effect_of(MODEL, 'series_compliance', compliance=0.2)])
+    assert stiff.chain().compliance() == pytest.approx(0.2e-3)

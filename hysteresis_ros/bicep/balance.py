@@ -31,6 +31,8 @@ LONGEST_TRANSIENT = 5.0
 # Longest step of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
 # would not be stable.
 LONGEST_PHASE = 0.7
+# What rings so fast that a sample would take more steps than this has come to rest by its end.
+MOST_PIECES = 200
 # An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
 # of less than this share of H2's range, does not ring, and is followed in longer steps.
 CALM, CALM_STEP, FADING = 0.005, 0.005, 0.97
@@ -69,7 +71,7 @@ class ArmBalance:
                        for drag in ((-1, 0, 1) if self.coulomb > 0.0 else (0,))}
         # Whether what the muscle has to give does not depend on friction.
         self._rigid = all(line.demand == self._lines[0].demand for line in self._lines.values())
-        self.has_dynamics = self.viscous > 0.0 or self.inertia > 0.0
+        self.has_dynamics = chain.moves
         self.tolerance = 1e-10 * (operator.upper - operator.lower)
         # Where the wires only stretch the arm is stiffest, and rings fastest.
         stiffness = np.max(leverage * statics.moment_arm) / (chain.compliance() or COMPLIANCE)
@@ -122,7 +124,7 @@ class ArmBalance:
             Angle [rad].
         """
         pieces = 1
-        self._ringing = 0.0 < dt < LONGEST_TRANSIENT and self.inertia > 0.0 and (
+        self._ringing = 0.0 < dt < min(LONGEST_TRANSIENT, MOST_PIECES * self._longest) and (
             abs(x - self._x) > self._calm or self._jerk > CALM)
         if self._ringing:
             pieces = math.ceil(dt / self._longest)

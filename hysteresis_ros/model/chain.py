@@ -19,6 +19,9 @@ from hysteresis_ros.effects import (
 from hysteresis_ros.effects.base import STAGES
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 
+# No wire of an arm yields less than this [m/N].
+LEAST_COMPLIANCE = 1e-6
+
 
 def in_order(effects: Sequence[Effect]) -> list[Effect]:
     """Return the effects in the order of their stages, without those that another replaces."""
@@ -165,11 +168,12 @@ class Chain:
                    0.0 * load)
 
     def compliance(self) -> float:
-        """Return what a wire yields elastically, as the model knows it [m per unit of u]."""
+        """Return what a wire yields elastically [m per unit of u], 0 where that is not known."""
         load = self.surroundings.load or 1.0
         yielded = self.stretch(np.float64(load)) - self.stretch(np.float64(0.0))
         inside = self.load_inside(np.float64(load)) - self.load_inside(np.float64(0.0))
-        return max(float(yielded / max(inside, 1e-3 * load)), 0.0)
+        found = float(yielded / max(inside, 1e-3 * load))
+        return found if found >= LEAST_COMPLIANCE else 0.0
 
     def drift(self, drive, heat, inputs: Inputs) -> tuple[np.ndarray, np.ndarray]:
         """Return offset and factor of each row, each shape (rows,)."""
