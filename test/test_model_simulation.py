@@ -180,6 +180,17 @@ def test_a_strong_effect_of_the_phase_agrees_with_the_phase_it_causes(name, valu
     assert np.sqrt(np.mean((again - angles) ** 2)) < math.radians(0.1)
 
 
+def test_of_the_passes_for_the_phase_the_last_ones_inputs_are_given():
+    """One entry a trial, however often it was run; a diagnosis of an extended model needs them."""
+    model = bicep_model(['creep'])
+    run = arm_run(VOLTAGE, 0.5)
+    run = Measurement.from_columns({
+        **run.columns, 'trial': np.arange(len(VOLTAGE)) // 300})
+    seen = []
+    Simulator(model, run).run(model.effects, seen)
+    assert [count for _, _, count in seen] == [300, 300, 200]
+
+
 @pytest.mark.parametrize('name', ['viscous_friction', 'inertia'])
 def test_an_arm_in_motion_is_never_strided(name):
     model = bicep_model([name])

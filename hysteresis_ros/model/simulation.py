@@ -152,10 +152,13 @@ class Simulator:
             return self._remembered[key]
         result = np.empty(self.measurement.rows)
         respond = self._responder(chain, inputs_of_stage)
-        for trial in self.trials:
+        for number, trial in enumerate(self.trials):
             if chain.needs_phase:
                 result[trial.rows] = self._agree(
                     respond, trial, MOVING_PASSES if chain.moves else PHASE_PASSES)
+                if inputs_of_stage is not None:
+                    # Of all passes the last one counts.
+                    del inputs_of_stage[number:-1]
             else:
                 result[trial.rows], _ = respond(trial, trial.inputs)
         if len(self._remembered) >= REMEMBERED:
