@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.diagnosis import structure
+from hysteresis_ros.diagnosis.derivatives import Derivatives
 from hysteresis_ros.diagnosis.fit import Fitter
-from hysteresis_ros.diagnosis.candidates import consider, possible
+from hysteresis_ros.diagnosis.candidates import begin, consider, finish, possible
 from hysteresis_ros.diagnosis.leftover import event_of, examine, flexible, lasting_step
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -225,7 +226,7 @@ def test_another_compliance_than_on_the_bench_takes_the_place_of_the_first():
     problem = problem_for(model, [recorded])
     fitter = Fitter(problem)
     base = fitter.cross_validate(model.effects, fitter.fit(model.effects, []))
-    found = consider(fitter, [], base, 'series_compliance')
+    found = consider(fitter, base, 'series_compliance')
     assert found.effect.values['compliance'] == pytest.approx(0.25, rel=0.02)
     assert found.rmse < 0.05 * fitter.error(base.held_out)
 
@@ -357,20 +358,67 @@ def test_a_fold_is_predicted_by_a_step_no_longer_than_it_helps(problem):
 
 
 def test_what_promises_nothing_is_not_fitted_to_the_end(problem, monkeypatch):
-    """It is followed for a few steps, and further where it takes anything off the error."""
+    """A few steps, and no simulation of its folds: a straight line says as much."""
     fitter = Fitter(problem)
-    asked = []
-    fit = fitter.fit
+    monkeypatch.setattr(problem, 'measured', problem.measured + 0.05 * np.cos(problem.measured))
+    begun = begin(fitter, [], [effect_of(problem.model, 'payload_error', dm=15.0)])
+    error = fitter.error(begun.predicted)
+    assert fitter.promises(begun, 1.03 * error) and not fitter.promises(begun, 1.01 * error)
+    simulated = []
+    simulate = problem.simulate
+    monkeypatch.setattr(problem, 'simulate',
+                        lambda *args: simulated.append(1) or simulate(*args))
+    nothing = dataclasses.replace(begun, converged=False)
+    current = dataclasses.replace(begun, held_out=begun.predicted)
+    found = finish(fitter, current, nothing)
+    assert not simulated
+    assert found.rmse == pytest.approx(error, rel=0.2)
+    current.predicted = np.zeros(len(problem.measured))
+    finish(fitter, current, nothing)
+    assert simulated
 
-    def counting(fixed, effects, rows=None, evaluations=None):
-        asked.append(evaluations)
-        return dataclasses.replace(fit(fixed, effects, rows, evaluations), converged=False)
-    monkeypatch.setattr(fitter, 'fit', counting)
-    effect = catalogue()['payload_error'](problem.model.surroundings)
-    fitter.search([], [], effect, without=1e-9)
-    assert set(asked) == {4}
-    fitter.search([], [], effect, without=10.0)
-    assert asked[-1] is None
+
+@pytest.mark.parametrize('bend', [0.0, 0.02, 30.0])
+def test_derivatives_follow_a_step_that_they_have_foretold(bend):
+    """Broyden's update costs no simulation; a step that surprises asks for differences again."""
+    matrix = np.array([[1.0, 2.0], [0.5, -1.0], [0.2, 0.1]])
+    asked = []
+
+    def response(vector):
+        asked.append(1)
+        return matrix @ vector + bend * vector[0] ** 2
+
+    derivatives = Derivatives(response, np.full(2, 10.0))
+    first, second = np.array([0.0, 1.0]), np.array([0.4, 1.3])
+    begun = derivatives.at(first)
+    assert not derivatives.rough and begun == pytest.approx(matrix, abs=0.03 * bend + 1e-9)
+    del asked[:]
+    found = derivatives.at(second)
+    assert derivatives.rough == (bend < 1.0)
+    # The response at both ends of the step, which a fit has anyhow, and two differences.
+    assert len(asked) == (2 if bend < 1.0 else 5)
+    if bend < 1.0:
+        # Broyden: right along the step, unchanged across it.
+        across = np.array([-0.3, 0.4])
+        assert found @ (second - first) == pytest.approx(response(second) - response(first))
+        assert found @ across == pytest.approx(begun @ across)
+    assert derivatives.at(second) is found
+
+
+def test_a_fit_that_goes_on_does_not_simulate_again_what_it_knows(problem, monkeypatch):
+    """Where it was, and the derivatives there; what is cross-validated has exact ones."""
+    fitter = Fitter(problem)
+    effects = [effect_of(problem.model, 'payload_error', dm=15.0)]
+    begun = fitter.fit([], effects, evaluations=1)
+    asked = []
+    simulate = problem.simulate
+    monkeypatch.setattr(problem, 'simulate',
+                        lambda *args: asked.append(1) or simulate(*args))
+    on = fitter.fit([], begun.effects, evaluations=1, begun=begun)
+    assert not asked and on.vector == pytest.approx(begun.vector)
+    rough = dataclasses.replace(begun, jacobian=1.1 * begun.jacobian, rough=True)
+    exact = fitter.cross_validate([], rough)
+    assert exact.jacobian == pytest.approx(begun.jacobian) and not exact.rough
 
 
 def test_the_noise_of_a_sensor_comes_from_its_steps():

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hysteresis_ros.diagnosis.candidates import hopeful
 from hysteresis_ros.diagnosis.diagnose import most_unexplained
 from hysteresis_ros.diagnosis.evidence import Evidence
 from hysteresis_ros.diagnosis.fit import Fit
@@ -93,6 +94,7 @@ def test_what_was_fitted_beside_the_others_is_not_fitted_again(monkeypatch):
     search = searching(fit(1.0))
     search.found = fit(0.1, names=('sag', 'rub'))
     search.rivals, search.jobs, search.progress = [], 1, None
+    search.problem = SimpleNamespace(refits=True, settled=True)
     search.first = [SimpleNamespace(id=name, effect=SimpleNamespace(id=name))
                     for name in ('sag', 'rub', 'air', 'room', 'tilt')]
     search._in_order = list
@@ -101,6 +103,24 @@ def test_what_was_fitted_beside_the_others_is_not_fitted_again(monkeypatch):
         fit(0.1, names=('sag', 'rub'))]}
     assert search.alternatives() == [[], ['air']]
     assert asked == [['air', 'room', 'tilt'], ['tilt']]
+
+
+def test_only_what_may_yet_be_among_the_best_is_fitted_to_the_end(monkeypatch):
+    """Half as much again as the best is too much, and less than the floor is never too much."""
+    search = searching(fit(1.0))
+    errors = [0.5, 0.7, 0.8]
+    begun = [fit(error) for error in errors]
+    assert hopeful(search.fitter, begun, floor=0.1) == begun[:2]
+    assert hopeful(search.fitter, begun, floor=0.6) == begun
+    assert hopeful(search.fitter, [], floor=0.1) == []
+    finished = []
+    module = 'hysteresis_ros.diagnosis.search.'
+    monkeypatch.setattr(module + 'try_sets', lambda fitter, sets, jobs, progress: begun)
+    monkeypatch.setattr(module + 'finish_sets', lambda fitter, fits, *_: finished.extend(fits))
+    search.problem, search.jobs, search.progress = SimpleNamespace(refits=False), 1, None
+    search.found = fit(0.4)
+    search._fitted([[], [], []])
+    assert finished == begun[:1]
 
 
 def test_a_whole_set_that_could_be_the_truth_is_named_place_by_place():
@@ -165,3 +185,19 @@ def test_more_effects_have_to_explain_more():
     """Two may leave half as much as one; with none found there is one cause to find."""
     assert most_unexplained('arm', 2) == 0.5 * most_unexplained('arm', 1)
     assert most_unexplained('arm', 0) == most_unexplained('arm', 1)
+
+
+@pytest.mark.parametrize('left, names, better', [
+    (0.5, ('stop',), True), (0.7, ('stop',), False), (0.5, ('stop', 'sag', 'air'), False)])
+def test_values_that_are_not_physical_but_explain_far_more_show_an_unknown(
+        monkeypatch, left, names, better):
+    """As long as it takes no more effects than were found, and what was found leaves much."""
+    monkeypatch.setattr(Fit, 'implausible', lambda self: ['stop.stiffness'])
+    search = searching(fit(10.0))
+    search.found, search.strange = fit(1.0, names=('sag', 'rub')), []
+    search.first = [SimpleNamespace(fit=fit(left, names=names))]
+    assert search.stood_in_for() == better
+    search.first, search.strange = [], [fit(left, names=names)]
+    assert search.stood_in_for() == better
+    search.evidence = SimpleNamespace(enough=1.1)
+    assert not search.stood_in_for()

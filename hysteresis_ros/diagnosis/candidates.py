@@ -3,18 +3,20 @@
 """Which effects a recording can show at all, and how well each of them explains it."""
 
 import dataclasses
-import itertools
 import math
 
 import joblib
 import numpy as np
 
-from hysteresis_ros.diagnosis.fit import beside, FIRST_EVALUATIONS, Fit
+from hysteresis_ros.diagnosis.fit import beside, Fit
 from hysteresis_ros.diagnosis.parameters import starts_of
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
 
 # A recorded temperature [degC] that changes by less is a constant with noise on it.
 SMALLEST_CHANGE = 0.5
+# Of what was fitted for a few steps, that is fitted to its end which errs by at most this many
+# times as much as the best, or as the floor.
+HOPEFUL = 1.5
 
 
 @dataclasses.dataclass
@@ -91,9 +93,9 @@ def may_differ(problem, effect) -> bool:
     return problem.kind == 'arm' and 'bench' in effect.kinds
 
 
-def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
+def begin(fitter, known, starts) -> Fit | None:
     """
-    Fit and cross-validate one effect.
+    Fit one effect for a few steps.
 
     Parameters
     ----------
@@ -101,30 +103,51 @@ def consider(fitter, known, current: Fit, name: str) -> Candidate | None:
         For the problem.
     known : list of Effect
         Effects found before.
-    current : Fit
-        The fit with them, cross-validated.
-    name : str
-        The effect to try.
+    starts : list of Effect
+        The effect to try, from where it may start.
 
     Returns
     -------
-    Candidate or None
+    Fit or None
         None if the simulation with it is not finite.
     """
-    problem = fitter.problem
-    kind = catalogue()[name]
-    others = [effect for effect in known if effect.id not in kind.replaces]
-    effect = present(problem.model, kind)
+    others = [effect for effect in known if effect.id not in starts[0].replaces]
     with np.errstate(all='ignore'):
-        fit = fitter.search(
-            problem.model.effects, others, effect, fitter.error(current.predicted))
-        fit = fitter.cross_validate(problem.model.effects, fit)
-    if _finite(fit) is None:
+        return finite(fitter.begin(fitter.problem.model.effects, others, starts))
+
+
+def finish(fitter, current: Fit, fit: Fit) -> Candidate | None:
+    """
+    Fit the last of some effects to the end, and cross-validate it.
+
+    Parameters
+    ----------
+    fitter : Fitter
+        For the problem.
+    current : Fit
+        The fit without it, cross-validated.
+    fit : Fit
+        See `begin`.
+    """
+    fixed, refits = fitter.problem.model.effects, fitter.problem.refits
+    with np.errstate(all='ignore'):
+        good = fitter.promises(fit, fitter.error(current.predicted))
+        fit = fitter.finish(fixed, fit) if good else fit
+        fit = fitter.cross_validate(fixed, fit, straight=not (good or refits))
+    if finite(fit) is None:
         return None
-    return Candidate(name, fit, fit.predicted - current.predicted, fitter.error(fit.held_out))
+    return Candidate(fit.effects[-1].id, fit, fit.predicted - current.predicted,
+                     fitter.error(fit.held_out))
 
 
-def _in_parallel(tasks, jobs):
+def consider(fitter, current: Fit, name: str) -> Candidate | None:
+    """Fit and cross-validate one effect by itself; see `begin` and `finish`."""
+    model = fitter.problem.model
+    fit = begin(fitter, [], fitter.starts(model.effects, present(model, catalogue()[name])))
+    return None if fit is None else finish(fitter, current, fit)
+
+
+def in_parallel(tasks, jobs):
     """Return the results in order, one by one where joblib's backend in force can do that."""
     try:
         parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
@@ -134,77 +157,105 @@ def _in_parallel(tasks, jobs):
     return parallel(tasks)
 
 
-def consider_all(fitter, known, current: Fit, names, jobs: int, progress) -> list[Candidate]:
-    """Try every effect named, in parallel; see `consider`."""
+def consider_all(fitter, current: Fit, names, jobs: int, progress) -> list[Candidate]:
+    """Try every effect named by itself, in parallel, best first; see `consider`."""
     # What takes longest begins first, so that no process has to wait for it: an arm in motion.
     names = sorted(names, key=lambda name: (
         not catalogue()[name].needs_transients, catalogue()[name].stage != 'mechanism'))
-    tasks = [joblib.delayed(consider)(fitter, known, current, name) for name in names]
-    found = []
-    for candidate in progress(_in_parallel(tasks, jobs), len(names)):
-        if candidate is not None and math.isfinite(candidate.rmse):
-            found.append(candidate)
-    return sorted(found, key=lambda candidate: candidate.rmse)
+    tasks = [joblib.delayed(consider)(fitter, current, name) for name in names]
+    return _ranked(progress(in_parallel(tasks, jobs), len(names)))
 
 
-def _starts(effects, kind) -> tuple[list, list]:
-    """Return usual values of some effects, and those that each had alone."""
-    usual = []
-    for effect in effects:
-        starts = starts_of(effect, kind)
-        # What is not fitted but chosen was chosen well by the effect alone.
-        usual.append(starts[len(starts) // 2].with_values(**{
-            parameter.name: effect.values[parameter.name]
-            for parameter in effect.parameters if parameter.choices}))
-    return usual, list(effects)
+def consider_beside(fitter, current: Fit, looks, floor, jobs: int,
+                    progress) -> tuple[list[Candidate], list[Fit]]:
+    """
+    Try effects beside those of a fit, in parallel.
+
+    Parameters
+    ----------
+    fitter : Fitter
+        For the problem.
+    current : Fit
+        With the effects that are known, cross-validated.
+    looks : list of list of Effect
+        Effects to try, each from where it may start.
+    floor : float
+        Error that base model and sensor leave by themselves.
+    jobs, progress
+        As for `Search`.
+
+    Returns
+    -------
+    list of Candidate, list of Fit
+        What was fitted to the end, best first; what a few steps showed to be hopeless.
+    """
+    tasks = [joblib.delayed(begin)(fitter, current.effects, starts) for starts in looks]
+    begun = [fit for fit in progress(in_parallel(tasks, jobs), len(tasks)) if fit is not None]
+    good = hopeful(fitter, begun, floor)
+    tasks = [joblib.delayed(finish)(fitter, current, fit) for fit in good]
+    candidates = _ranked(progress(in_parallel(tasks, jobs), len(good)))
+    return candidates, [fit for fit in begun if not any(fit is one for one in good)]
 
 
-def _try_set(fitter, effects) -> Fit | None:
-    """Fit some effects together for a few steps from the better start."""
-    problem = fitter.problem
-
-    def error(start):
-        predicted = problem.simulate([*beside(problem.model.effects, start), *start])
-        return fitter.error(predicted)
-    with np.errstate(all='ignore'):
-        start = min(_starts(effects, problem.kind), key=error)
-        return _finite(fitter.fit(problem.model.effects, start, evaluations=FIRST_EVALUATIONS))
+def hopeful(fitter, fits, floor) -> list[Fit]:
+    """Return the fits that may yet be among the best."""
+    errors = [fitter.error(fit.predicted) for fit in fits]
+    limit = HOPEFUL * max(min(errors, default=0.0), floor)
+    return [fit for fit, error in zip(fits, errors) if error <= limit]
 
 
-def _consider_set(fitter, effects) -> Fit | None:
-    """Fit some effects together from the better start, and cross-validate the fit."""
-    problem = fitter.problem
-    # Which start is the better one shows soon, but for weights that are refitted.
-    first = None if problem.refits else FIRST_EVALUATIONS
-    with np.errstate(all='ignore'):
-        fits = [fitter.fit(problem.model.effects, start, evaluations=first)
-                for start in _starts(effects, problem.kind)]
-        best = min(fits, key=lambda fit: fitter.error(fit.predicted))
-        if not (best.converged or problem.refits):
-            best = fitter.fit(problem.model.effects, best.effects)
-        return _finite(fitter.cross_validate(problem.model.effects, best))
+def _ranked(candidates) -> list[Candidate]:
+    return sorted((candidate for candidate in candidates
+                   if candidate is not None and math.isfinite(candidate.rmse)),
+                  key=lambda candidate: candidate.rmse)
 
 
-def _finite(fit) -> Fit | None:
+def finite(fit) -> Fit | None:
     """Return a fit, or None where the simulation with it is not finite."""
     judged = fit.predicted if fit.held_out is None else fit.held_out
     return fit if np.all(np.isfinite(judged)) and np.all(np.isfinite(fit.jacobian)) else None
 
 
-def subsets(effects, most: int) -> list[list]:
-    """Return every set of at most `most` of the effects in which none contains another."""
-    return [list(subset) for size in range(1, most + 1)
-            for subset in itertools.combinations(effects, size)
-            if not any(other.id in effect.replaces for effect in subset for other in subset)]
+def changes_beside(fitter, effects, candidates, jobs: int,
+                   progress) -> list[list[tuple[Effect, np.ndarray]]]:
+    """
+    Return what each candidate changes beside other effects, from each of its starts.
+
+    What takes long to simulate, but hardly matters to what another changes, is left out of the
+    others: the arm's own motion, and what follows the phase.
+
+    Parameters
+    ----------
+    fitter : Fitter
+        For the problem.
+    effects : sequence of Effect
+        The others, with values.
+    candidates : sequence of Candidate
+        Fitted by themselves; those values are a start, too.
+    jobs, progress
+        As for `Search`.
+
+    Returns
+    -------
+    list of list of (Effect, ndarray of shape (n,))
+        For each candidate its starts with what they change.
+    """
+    problem = fitter.problem
+    effects = [effect for effect in effects
+               if not (effect.needs_phase or getattr(effect, 'moves', False))]
+    without = problem.simulate([*beside(problem.model.effects, effects), *effects])
+    tasks = [joblib.delayed(_changes)(problem, effects, candidate.effect, without)
+             for candidate in candidates]
+    return list(progress(in_parallel(tasks, jobs), len(tasks)))
 
 
-def consider_sets(fitter, sets, jobs: int, progress) -> list[Fit]:
-    """Fit and cross-validate sets of effects, in parallel."""
-    tasks = [joblib.delayed(_consider_set)(fitter, effects) for effects in sets]
-    return [fit for fit in progress(_in_parallel(tasks, jobs), len(sets)) if fit is not None]
-
-
-def try_sets(fitter, sets, jobs: int, progress) -> list[Fit]:
-    """Fit sets of effects for a few steps, to see which are worth more; in parallel."""
-    tasks = [joblib.delayed(_try_set)(fitter, effects) for effects in sets]
-    return [fit for fit in progress(_in_parallel(tasks, jobs), len(sets)) if fit is not None]
+def _changes(problem, effects, fitted, without):
+    effect = present(problem.model, catalogue()[fitted.id])
+    changes = []
+    with np.errstate(all='ignore'):
+        for start in [*starts_of(effect, problem.kind), fitted]:
+            together = [*effects, start]
+            change = problem.simulate(
+                [*beside(problem.model.effects, together), *together]) - without
+            changes.append((start, np.where(np.isfinite(change), change, 0.0)))
+    return changes

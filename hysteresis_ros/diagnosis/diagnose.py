@@ -161,7 +161,7 @@ class _Verdict:
                     and np.sqrt(1.0 - share) * self.before < (1.0 - PRACTICAL) * self.after)
         if not happened:
             event = left.event if left.event_share > EVENT_SHARE else None
-        unknown = happened or unexplained > most_unexplained(
+        unknown = happened or search.stood_in_for() or unexplained > most_unexplained(
             problem.kind, len(search.found.effects))
         if unknown:
             # What explains a part of it stands in the ranking; the cause is none of these.

@@ -7,10 +7,9 @@ import dataclasses
 import numpy as np
 from scipy import optimize, stats
 
+from hysteresis_ros.diagnosis.derivatives import Derivatives, differences
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 
-# Simulated responses are smooth only on this scale of the parameters' units.
-DIFFERENCE = 0.02
 # Starts that are followed for a few steps after all were tried once, if their mean square error is
 # not larger than the best's by this factor; the best goes on.
 FOLLOWED_STARTS = 2
@@ -45,6 +44,8 @@ class Fit:
         Response of every row as predicted by a fit to the other folds; see `cross_validate`.
     converged : bool
         Whether the fit ended by itself.
+    rough : bool
+        Whether the derivatives are those that sufficed for the fit; see `Derivatives`.
     """
 
     effects: list
@@ -53,6 +54,7 @@ class Fit:
     jacobian: np.ndarray
     held_out: np.ndarray | None = None
     converged: bool = True
+    rough: bool = False
 
     def implausible(self) -> list:
         """Names of parameters whose estimate is outside their physical range."""
@@ -90,7 +92,7 @@ class Fitter:
             return self.problem.simulate(kept + parameters.with_vector(vector), train)
         return respond
 
-    def fit(self, fixed, effects, rows=None, evaluations=None) -> Fit:
+    def fit(self, fixed, effects, rows=None, evaluations=None, begun: Fit | None = None) -> Fit:
         """
         Fit from the present values of `effects`.
 
@@ -104,6 +106,8 @@ class Fitter:
             Rows to fit; all by default.
         evaluations : int, optional
             Steps of the optimiser at most; by default enough to converge.
+        begun : Fit, optional
+            A fit of the same effects to the same rows to go on from.
 
         Returns
         -------
@@ -129,97 +133,117 @@ class Fitter:
                 cache[key] = respond(vector)
             return cache[key]
 
-        def jacobian(vector):
-            centre = full(vector)
-            columns = []
-            for k in range(len(vector)):
-                step = DIFFERENCE if vector[k] + DIFFERENCE < parameters.upper[k] else -DIFFERENCE
-                moved = np.array(vector)
-                moved[k] += step
-                columns.append((full(moved) - centre) / step)
-            return np.column_stack(columns)
-
+        # Weights that are fitted again bend the way too much for an update.
+        derivatives = Derivatives(full, parameters.upper, updates=not problem.refits)
+        if begun is not None:
+            start = begun.vector
+            cache[start.tobytes()] = begun.predicted
+            derivatives.begin(start, begun.jacobian, begun.rough)
         found = optimize.least_squares(
             lambda vector: (full(vector)[rows] - measured) / scale, start,
-            jac=lambda vector: jacobian(vector)[rows] / scale,
+            jac=lambda vector: derivatives.at(vector)[rows] / scale,
             bounds=(parameters.lower, parameters.upper), method='trf', x_scale=1.0,
             xtol=1e-3, ftol=1e-3, gtol=1e-8,
             max_nfev=evaluations or MOST_EVALUATIONS[problem.refits])
-        # The optimiser has the derivatives of the rows it was given.
-        derivatives = found.jac * scale if np.all(rows) else jacobian(found.x)
-        return Fit(parameters.with_vector(found.x), found.x, full(found.x), derivatives,
-                   converged=found.status > 0)
+        return Fit(parameters.with_vector(found.x), found.x, full(found.x),
+                   derivatives.at(found.x), converged=found.status > 0, rough=derivatives.rough)
 
-    def search(self, fixed, known, effect, without: float = np.inf, rows=None) -> Fit:
+    def search(self, fixed, known, effect) -> Fit:
+        """Fit `effect` together with the `known` ones to the end; see `begin` and `finish`."""
+        return self.finish(fixed, self.begin(fixed, known, self.starts(fixed, effect)))
+
+    def starts(self, fixed, effect) -> list:
+        """Return an effect at the values from which a fit may start."""
+        starts = starts_of(effect, self.problem.kind)
+        if len(beside(fixed, [effect])) < len(fixed):
+            # What the bench says of it is as good a start as any.
+            starts.append(effect)
+        return starts
+
+    def begin(self, fixed, known, starts) -> Fit:
         """
-        Fit `effect` together with the `known` ones, from the best of its starts.
+        Fit one more effect together with the `known` ones for a few steps.
 
         Parameters
         ----------
-        fixed, rows
+        fixed
             As for `fit`.
-        without : float
-            Error without the effect; what does not promise less is not fitted to the end.
         known : sequence of Effect
             Effects found before, fitted again beside the new one.
-        effect : Effect
-            The new one; its values count only if it takes the place of a fixed one.
+        starts : sequence of Effect
+            The new one from where it may start; the best are followed.
         """
-        mask = slice(None) if rows is None else rows
-        measured = self.problem.measured[mask]
-
-        kept = beside(fixed, [*known, effect])
-
-        def error(candidate):
-            predicted = self.problem.simulate([*kept, *known, candidate], rows)
-            return float(np.mean((predicted[mask] - measured) ** 2))
-
-        starts = starts_of(effect, self.problem.kind)
-        if len(kept) < len(fixed):
-            # What the bench says of it is as good a start as any.
-            starts.append(effect)
-        errors = [error(start) for start in starts]
+        kept = [*beside(fixed, [*known, starts[0]]), *known]
+        errors = [self.error(self.problem.simulate([*kept, start])) ** 2 for start in starts]
         order = np.argsort(errors, kind='stable')
         followed = [starts[index] for index in order[:1 if known else FOLLOWED_STARTS]
                     if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
-        fits = [self.fit(fixed, [*known, start], rows, FIRST_EVALUATIONS) for start in followed]
-        best = min(fits, key=lambda fit: self.error(fit.predicted, mask))
-        if best.converged or self.error(best.predicted, mask) > (1.0 - PROMISING) * without:
-            return best
-        return self.fit(fixed, best.effects, rows)
+        return min((self.fit(fixed, [*known, start], evaluations=FIRST_EVALUATIONS)
+                    for start in followed), key=lambda fit: self.error(fit.predicted))
+
+    def finish(self, fixed, fit) -> Fit:
+        """Follow a fit to its end, unless it has ended; see `begin`."""
+        return fit if fit.converged else self.fit(fixed, fit.effects, begun=fit)
+
+    def promises(self, fit, without: float) -> bool:
+        """Whether a fit has taken off any of the error without the effect."""
+        return self.error(fit.predicted) <= (1.0 - PROMISING) * without
 
     def error(self, predicted, rows=slice(None)) -> float:
         """Root mean square error of some rows."""
         return float(np.sqrt(np.mean((predicted[rows] - self.problem.measured[rows]) ** 2)))
 
-    def cross_validate(self, fixed, fit: Fit) -> Fit:
+    def cross_validate(self, fixed, fit: Fit, straight: bool = False) -> Fit:
         """
-        Fill in `held_out`: every fold predicted by a fit to the others, simulated anew.
+        Fill in `held_out`: every fold predicted by a fit to the others.
 
         The fit to all rows is the start; where the effects' parameters are all that is fitted, a
         Gauss-Newton step from there is as good as a new search, if it is no longer than it helps.
+
+        Parameters
+        ----------
+        fixed
+            As for `fit`.
+        fit : Fit
+            To all rows.
+        straight : bool
+            Take such a step along the derivatives, without a simulation: for what explains
+            nothing anyhow.
         """
         problem = self.problem
         held_out = np.empty(len(problem.measured))
         parameters = ParameterVector(fit.effects, problem.kind)
+        if fit.rough and not straight:
+            jacobian = differences(self._respond(fixed, parameters, None), fit.vector,
+                                   fit.predicted, parameters.upper)
+            fit = dataclasses.replace(fit, jacobian=jacobian, rough=False)
         for fold in problem.folds:
             test = problem.fold == fold
             if problem.refits:
-                refit = self.fit(fixed, fit.effects, ~test, HELD_OUT_EVALUATIONS)
-                held_out[test] = refit.predicted[test]
-                continue
-            held_out[test] = self._stepped(fixed, fit, parameters, ~test)[test]
+                predicted = self.fit(
+                    fixed, fit.effects, ~test, HELD_OUT_EVALUATIONS).predicted
+            elif straight:
+                predicted = fit.predicted + fit.jacobian @ self._step(fit, ~test)
+            else:
+                predicted = self._stepped(fixed, fit, parameters, ~test)
+            held_out[test] = predicted[test]
         return dataclasses.replace(fit, held_out=held_out)
 
-    def _stepped(self, fixed, fit, parameters, train):
-        """Return the response after a Gauss-Newton step towards the rows to train on."""
+    def _step(self, fit, train):
+        """Return a Gauss-Newton step towards the rows to train on, shape (k,)."""
         if len(fit.vector) == 0:
-            return fit.predicted
+            return np.zeros(0)
         jacobian, error = fit.jacobian[train], (self.problem.measured - fit.predicted)[train]
         gram = jacobian.T @ jacobian
         ridge = 1e-6 * np.trace(gram) / len(gram) + 1e-300
-        step = np.clip(np.linalg.solve(
+        return np.clip(np.linalg.solve(
             gram + ridge * np.eye(len(gram)), jacobian.T @ error), -1.0, 1.0)
+
+    def _stepped(self, fixed, fit, parameters, train):
+        """Return the response after such a step."""
+        if len(fit.vector) == 0:
+            return fit.predicted
+        step = self._step(fit, train)
         for _ in range(MOST_HALVINGS):
             vector = np.clip(fit.vector + step, parameters.lower, parameters.upper)
             predicted = self.problem.simulate(

@@ -15,10 +15,11 @@ import numpy as np
 
 from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.candidates import (
-    consider_all, consider_sets, possible, present, subsets, try_sets)
+    changes_beside, consider_all, consider_beside, hopeful, possible, present)
 from hysteresis_ros.diagnosis.evidence import Evidence, PRACTICAL, SIGNIFICANCE
 from hysteresis_ros.diagnosis.fit import beside, Fitter
 from hysteresis_ros.diagnosis.parameters import starts_of
+from hysteresis_ros.diagnosis.sets import consider_sets, finish_sets, subsets, try_sets
 from hysteresis_ros.effects import catalogue
 
 MOST_EFFECTS = 3
@@ -30,13 +31,20 @@ MOST_SEEDS = 2
 MOST_IN_SETS = 5
 # Effects that are fitted beside those found, the most promising of a straight extrapolation.
 MOST_RIVALS = 8
+# Starts of each that such an extrapolation leaves.
+MOST_STARTS = 3
 # Numbers of pairs that are fitted one after the other until one explains it all, and how many of
 # the best are then fitted to the end, by whether rows are settled: a continuous one takes longer.
 BATCHES = {True: (12, 12, 12, 12, 12), False: (8,)}
 MOST_PAIRS = {True: 4, False: 2}
-# Rivals that are fitted again when a set of effects is checked.
-RIVALS = 6
+# Only so many of the batches where a single effect leaves less than this many times as much as
+# ends the search: pairs have little more to explain.
+FEW_BATCHES, NEARLY = 1, 2.0
+# Sets that are begun, by whether rows are settled, for the alternatives to each effect of a set.
+RIVALS = {True: 6, False: 3}
 MOST_ALTERNATIVES = 3
+# What leaves less than this share of what the effects found leave explains far more.
+STRANGE = 0.6
 
 
 def _names(effects) -> frozenset:
@@ -68,6 +76,8 @@ class Search:
         Every effect by itself, best first.
     rivals : list of Fit
         Other sets of as many effects.
+    strange : list of Fit
+        Grown sets with a value that is not physical.
     hopeless : dict of str to str
         Effects that this data cannot show, with the reason.
     """
@@ -81,12 +91,13 @@ class Search:
         self.fixed = list(problem.model.effects)
         self.base = self.found = self.refit([])
         self.evidence = Evidence(problem, self.fixed, self.base.predicted, self.rng)
-        self.rivals = []
+        self.rivals, self.strange = [], []
         self._changes = {}
         # Fits of one more effect beside those that were known, by their names.
         self._beside = {}
         names, self.hopeless = possible(problem, [])
-        self.first = self.consider([], self.base, names)
+        self.first = consider_all(self.fitter, self.base, names, jobs, progress)
+        self._beside[frozenset()] = self._judged(self.first, self.base)
 
     def error(self, fit) -> float:
         """Return the held-out RMSE of a fit."""
@@ -96,13 +107,20 @@ class Search:
         """Fit effects from their present values, and cross-validate them."""
         return self.fitter.cross_validate(self.fixed, self.fitter.fit(self.fixed, effects))
 
-    def consider(self, known, current, names) -> list:
-        """Fit each effect named beside the known ones; best first, with p values."""
-        candidates = consider_all(self.fitter, known, current, names, self.jobs, self.progress)
-        values = self.evidence.p_values([candidate.fit for candidate in candidates], current)
+    def _judged(self, candidates, current, family=()) -> list:
+        """Fill in the p values of candidates, best of a family, and return their fits."""
+        fits = [candidate.fit for candidate in candidates]
+        values = self.evidence.p_values(fits, current, family)
         for candidate, value in zip(candidates, values):
             candidate.p_value = float(value)
-        self._beside[_names(known)] = [candidate.fit for candidate in candidates]
+        return fits
+
+    def consider(self, current, looks) -> list:
+        """Fit each effect beside those of a fit; the best of them first, with p values."""
+        candidates, hopeless = consider_beside(
+            self.fitter, current, looks, self.evidence.floor, self.jobs, self.progress)
+        self._beside[_names(current.effects)] = self._judged(
+            candidates, current, [fit.jacobian for fit in hopeless])
         return candidates
 
     def run(self) -> None:
@@ -114,8 +132,6 @@ class Search:
         enough = [fit for fit in sets if self.error(fit) <= (1.0 + PRACTICAL) * best]
         self.found = min(enough, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.error(fit)))
-        if not self.problem.refits:
-            self._drop()
         self.rivals = [fit for fit in sets if fit is not self.found
                        and len(fit.effects) == len(self.found.effects)]
 
@@ -131,12 +147,21 @@ class Search:
                 fitted = {fit.effects[-1].id for fit in rivals} | taken
                 sets = self._in_order([[*others, candidate.effect] for candidate in self.first
                                        if candidate.id not in fitted])
-                rivals += consider_sets(self.fitter, sets[:RIVALS], self.jobs, self.progress)
+                rivals += self._fitted(sets[:RIVALS[self.problem.settled]])
             close = [fit for fit in sorted(rivals, key=self.error) if not fit.implausible()
                      and self.evidence.could_be(fit, self.found)]
             result.append([fit.effects[-1].id for fit in close[:MOST_ALTERNATIVES]])
         self._add_rivals(result)
         return result
+
+    def _fitted(self, sets) -> list:
+        """Fit sets of effects, to their end where they may be about as good as the one found."""
+        if self.problem.refits:
+            return consider_sets(self.fitter, sets, self.jobs, self.progress)
+        begun = try_sets(self.fitter, sets, self.jobs, self.progress)
+        good = hopeful(self.fitter, [self.found, *begun], self.evidence.floor)
+        return finish_sets(self.fitter, [fit for fit in good if fit is not self.found],
+                           self.jobs, self.progress)
 
     def _add_rivals(self, alternatives) -> None:
         """Add the effects of whole sets that could as well be the truth."""
@@ -151,6 +176,19 @@ class Search:
             for place, name in zip(places, new):
                 if not any(name in named for named in alternatives):
                     alternatives[place].append(name)
+
+    def stood_in_for(self) -> bool:
+        """
+        Whether no more effects than those found explain far more with values that are not physical.
+
+        Then what is missing is like them, and is neither them nor what was found.
+        """
+        found = self.error(self.found)
+        strange = self.strange + [candidate.fit for candidate in self.first
+                                  if candidate.fit.implausible()]
+        return found > self.evidence.enough and any(
+            len(fit.effects) <= len(self.found.effects) and self.error(fit) < STRANGE * found
+            for fit in strange)
 
     def _on_bench(self):
         """
@@ -167,13 +205,15 @@ class Search:
 
     def _on_arm(self):
         """Grow sets, from the best plausible effect and from those that fit clearly better."""
-        grown = [self._grow(seed.fit) for seed in self._seeds()]
-        sets = [fit for fit in grown if not fit.implausible()]
-        # Three effects may do what two others are the cause of.
-        few = [fit for fit in [self.base, *sets] if len(fit.effects) < MOST_EFFECTS]
-        if all(self._leaves(fit) for fit in few):
-            sets += self._pairs(sets)
-        return sets
+        sets = []
+        for seed in self._seeds():
+            fit = self._grow(seed.fit)
+            (self.strange if fit.implausible() else sets).append(fit)
+            # Three effects may do what two others are the cause of.
+            few = [fit for fit in [self.base, *sets] if len(fit.effects) < MOST_EFFECTS]
+            if not all(self._leaves(fit) for fit in few):
+                return sets
+        return sets + self._pairs(sets)
 
     def _seeds(self):
         significant = [candidate for candidate in self.first
@@ -212,45 +252,43 @@ class Search:
                 and self.evidence.helps(candidate.fit, current))
 
     def _grow(self, fit):
-        """Add effects to a fit while each explains more."""
+        """Add effects to a fit while each explains more; take out what is then needless."""
         while len(fit.effects) < MOST_EFFECTS and self._leaves(fit):
-            known = fit.effects
-            possibly, _ = possible(self.problem, known)
-            names = [name for name in self._worth_another_look(fit) if name in possibly]
-            rivals = [rival for rival in self.consider(known, fit, names)
+            rivals = [rival for rival in self.consider(fit, self._worth_another_look(fit))
                       if self._matters(rival.fit, fit) and self._significant(rival, fit)]
             plausible = [rival for rival in rivals if not rival.fit.implausible()]
             chosen = self._simplest(plausible or (rivals if fit.implausible() else []))
+            if rivals and not plausible and not self._leaves(rivals[0].fit):
+                # What has stood in for the newest is not needed any more.
+                without = self._without_needless(rivals[0].fit)
+                if not without.implausible():
+                    return without
             if not chosen:
                 break
             fit = self.refit(chosen[0].fit.effects)
-        return fit
+        return self._without_needless(fit)
 
     def _worth_another_look(self, fit) -> list:
-        """Effects that have anything to say about what is left, the most promising first."""
+        """
+        Return effects that have anything to say about what is left, the most promising first.
+
+        Each at its most promising starts.
+        """
         left = self.problem.measured - fit.predicted
         limit = (1.0 - PRACTICAL) * float(np.mean(left ** 2))
-        known = {effect.id for effect in fit.effects}
-        # A single column more cannot explain much by chance, and a drift that is foretold for a
-        # trial would count against whatever stands beside it.
-        worth = {candidate.id: min(
-            float(np.mean(significance.residualise(np.hstack([fit.jacobian, change]), left) ** 2))
-            for change in self._changes_beside(fit, candidate))
-                 for candidate in self.first if candidate.id not in known}
-        names = [name for name in sorted(worth, key=worth.get) if worth[name] < limit]
-        return names[:MOST_RIVALS]
-
-    def _changes_beside(self, fit, candidate) -> list:
-        """Return what an effect changes beside others, shape (n, 1), from each of its starts."""
-        effect = present(self.problem.model, catalogue()[candidate.id])
-        changes = []
-        with np.errstate(all='ignore'):
-            for start in [*starts_of(effect, self.problem.kind), candidate.effect]:
-                together = [*fit.effects, start]
-                change = self.problem.simulate(
-                    [*beside(self.fixed, together), *together]) - fit.predicted
-                changes.append(np.where(np.isfinite(change), change, 0.0)[:, None])
-        return changes
+        names, _ = possible(self.problem, fit.effects)
+        candidates = [candidate for candidate in self.first if candidate.id in names]
+        looks = []
+        for changes in changes_beside(
+                self.fitter, fit.effects, candidates, self.jobs, self.progress):
+            # A single column more cannot explain much by chance, and a drift that is foretold for
+            # a trial would count against whatever stands beside it.
+            worth = [float(np.mean(significance.residualise(
+                np.column_stack([fit.jacobian, change]), left) ** 2)) for _, change in changes]
+            order = np.argsort(worth, kind='stable')
+            looks.append((worth[order[0]], [changes[index][0] for index in order[:MOST_STARTS]]))
+        looks.sort(key=lambda look: look[0])
+        return [starts for worth, starts in looks[:MOST_RIVALS] if worth < limit]
 
     def _straight(self, columns, left) -> float:
         """Return the held-out mean square error of a straight extrapolation."""
@@ -298,35 +336,42 @@ class Search:
 
         Kept are those that explain more than the best single effect would with chance's help.
         """
+        tried = {_names(fit.effects) for fits in self._beside.values() for fit in fits}
         pairs = self._in_order([pair for pair in subsets(
-            [candidate.effect for candidate in self.first], 2) if len(pair) == 2])
+            [candidate.effect for candidate in self.first], 2)
+                                if len(pair) == 2 and _names(pair) not in tried])
+        singles = [fit for fit in grown if len(fit.effects) == 1] or [self.base]
+        single = min(singles, key=self.error)
         fits, waiting, settled = [], iter(pairs), self.problem.settled
-        for count in BATCHES[settled]:
+        batches = BATCHES[settled]
+        if self.error(single) <= NEARLY * self.evidence.enough:
+            batches = batches[:FEW_BATCHES]
+        for count in batches:
             chosen = list(itertools.islice(waiting, count))
             fits += try_sets(self.fitter, chosen, self.jobs, self.progress)
             fits.sort(key=lambda fit: self.fitter.error(fit.predicted))
             if fits and self.fitter.error(fits[0].predicted) <= self.evidence.floor:
                 break
         plausible = [fit for fit in fits if not fit.implausible()]
-        best = [self.refit(fit.effects) for fit in plausible[:MOST_PAIRS[settled]]]
-        best = [self._grow(fit) for fit in best[:1]] + best
+        best = finish_sets(self.fitter, plausible[:MOST_PAIRS[settled]], self.jobs, self.progress)
         best = [fit for fit in best if not fit.implausible()]
-        singles = [fit for fit in grown if len(fit.effects) == 1] or [self.base]
-        single = min(singles, key=self.error)
         # Any of the pairs might have come out best by chance.
         jacobians = {candidate.id: candidate.fit.jacobian for candidate in self.first}
         family = [np.column_stack([jacobians[effect.id] for effect in pair]) for pair in pairs]
         values = self.evidence.p_values(best, single, family)
-        return [fit for fit, value in zip(best, values)
+        good = [fit for fit, value in zip(best, values)
                 if value <= SIGNIFICANCE and self.evidence.helps(fit, single)
                 and self._matters(fit, single)]
+        # What an effect leaves that sets were grown from has been seen.
+        seeds = frozenset().union(*(names for names in self._beside if len(names) == 1))
+        best = sorted(good, key=self.error)[:1]
+        grown = [self._grow(fit) for fit in best if not seeds & _names(fit.effects)]
+        return good + [fit for fit in grown if not fit.implausible()]
 
-    def _drop(self) -> None:
+    def _without_needless(self, fit):
         """Take out an effect that a later one has made needless."""
-        if len(self.found.effects) < 2:
-            return
-        for effect in self.found.effects:
-            without = self.refit([other for other in self.found.effects if other is not effect])
-            if self.error(without) <= (1.0 + PRACTICAL) * self.error(self.found):
-                self.found = without
-                return
+        for effect in fit.effects if len(fit.effects) > 1 else ():
+            without = self.refit([other for other in fit.effects if other is not effect])
+            if self.error(without) <= (1.0 + PRACTICAL) * self.error(fit):
+                return without
+        return fit

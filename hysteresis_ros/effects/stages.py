@@ -168,6 +168,11 @@ class MechanismEffect(Effect):
         """
         return 0.0, 0.0, 0.0
 
+    @property
+    def moves(self) -> bool:
+        """Whether the arm's own velocity or acceleration counts."""
+        return any(self.resistance()[1:])
+
 
 class SensorEffect(Effect):
     """

@@ -70,7 +70,7 @@ class Chain:
     @property
     def moves(self) -> bool:
         """Whether the arm's own velocity or acceleration counts."""
-        return any(any(effect.resistance()[1:]) for effect in self.mechanism)
+        return any(effect.moves for effect in self.mechanism)
 
     @property
     def drifts(self) -> bool:
