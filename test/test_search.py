@@ -10,6 +10,7 @@ import pytest
 from hysteresis_ros.diagnosis.candidates import hopeful
 from hysteresis_ros.diagnosis.diagnose import most_unexplained
 from hysteresis_ros.diagnosis.evidence import Evidence
+from hysteresis_ros.diagnosis.extrapolation import promising
 from hysteresis_ros.diagnosis.fit import Fit
 from hysteresis_ros.diagnosis.search import Search
 
@@ -97,7 +98,7 @@ def test_what_was_fitted_beside_the_others_is_not_fitted_again(monkeypatch):
     search.problem = SimpleNamespace(refits=True, settled=True)
     search.first = [SimpleNamespace(id=name, effect=SimpleNamespace(id=name))
                     for name in ('sag', 'rub', 'air', 'room', 'tilt')]
-    search._in_order = list
+    search.extrapolation = SimpleNamespace(in_order=list)
     search._beside = {frozenset({'sag'}): [
         fit(0.102, names=('sag', 'air')), fit(0.5, names=('sag', 'room')),
         fit(0.1, names=('sag', 'rub'))]}
@@ -121,6 +122,19 @@ def test_only_what_may_yet_be_among_the_best_is_fitted_to_the_end(monkeypatch):
     search.found = fit(0.4)
     search._fitted([[], [], []])
     assert finished == begun[:1]
+
+
+def test_what_has_nothing_to_say_about_what_is_left_is_not_looked_at():
+    """An effect counts at its best start, beside the derivatives of what is known."""
+    left, known = CHANCE.standard_normal((2, ROWS))
+    changes = [[('none', CHANCE.standard_normal(ROWS)), ('zero', 0.0 * left)],
+               [('bad', CHANCE.standard_normal(ROWS)), ('known', left + 0.5 * known),
+                ('some', left + 0.5 * CHANCE.standard_normal(ROWS)), ('zero', 0.0 * left)],
+               [('seen', known)]]
+    limit = 0.9 * np.mean(left ** 2)
+    looks = promising(changes, known[:, None], left, limit)
+    assert len(looks) == 1 and looks[0][:2] == ['known', 'some'] and len(looks[0]) == 3
+    assert len(promising(changes, known[:, None], left, 1.1 * np.mean(left ** 2))) == 3
 
 
 def test_a_whole_set_that_could_be_the_truth_is_named_place_by_place():
@@ -195,9 +209,10 @@ def test_values_that_are_not_physical_but_explain_far_more_show_an_unknown(
     monkeypatch.setattr(Fit, 'implausible', lambda self: ['stop.stiffness'])
     search = searching(fit(10.0))
     search.found, search.strange = fit(1.0, names=('sag', 'rub')), []
-    search.first = [SimpleNamespace(fit=fit(left, names=names))]
-    assert search.stood_in_for() == better
-    search.first, search.strange = [], [fit(left, names=names)]
-    assert search.stood_in_for() == better
+    one = fit(left, names=names)
+    search.first = [SimpleNamespace(fit=one), SimpleNamespace(fit=fit(0.9, names=('air',)))]
+    assert (search.stand_in() is one) == better
+    search.first, search.strange = [], [one]
+    assert (search.stand_in() is one) == better
     search.evidence = SimpleNamespace(enough=1.1)
-    assert not search.stood_in_for()
+    assert search.stand_in() is None

@@ -68,6 +68,8 @@ class Diagnosis:
         Time [s] at which something happened that lasts.
     signal : str
         Signal in which unexplained structure shows.
+    resembles : list of str
+        Effects that an unknown one is like; they explain it with values that are not physical.
     """
 
     verdict: str
@@ -84,6 +86,7 @@ class Diagnosis:
     not_excited: dict
     event: float | None
     signal: str
+    resembles: list = dataclasses.field(default_factory=list)
 
     def to_json(self) -> dict:
         """Return plain types for JSON."""
@@ -161,7 +164,9 @@ class _Verdict:
                     and np.sqrt(1.0 - share) * self.before < (1.0 - PRACTICAL) * self.after)
         if not happened:
             event = left.event if left.event_share > EVENT_SHARE else None
-        unknown = happened or search.stood_in_for() or unexplained > most_unexplained(
+        stand_in = search.stand_in()
+        resembles = [effect.id for effect in stand_in.effects] if stand_in else []
+        unknown = bool(happened or resembles) or unexplained > most_unexplained(
             problem.kind, len(search.found.effects))
         if unknown:
             # What explains a part of it stands in the ranking; the cause is none of these.
@@ -175,10 +180,11 @@ class _Verdict:
             verdict=verdict, missing=missing, alternatives=alternatives,
             ranking=self._ranking(missing), noise_floor=problem.noise,
             structural_error=search.evidence.structure, unexplained=float(min(unexplained, 1.0)),
-            experiment=self._experiment(verdict, missing, alternatives, not_excited),
+            experiment=self._experiment(verdict, missing or resembles, alternatives, not_excited),
             effects=effects, rmse_before=self.before, rmse_after=self.after,
             not_excited=not_excited, event=event if unknown else None,
-            signal=left.signal if unknown else '')
+            signal=left.signal if unknown else '',
+            resembles=resembles)
 
     def _known(self, not_excited) -> str:
         if self.search.found.effects:
@@ -261,8 +267,10 @@ class _Verdict:
     def _experiment(self, verdict, missing, alternatives, not_excited) -> str:
         effects = catalogue()
         if verdict == 'unknown':
-            return ('repeat the recording with another sequence of the drive and look at the '
-                    'residual; no effect of the catalogue explains it')
+            return '; '.join([
+                'repeat the recording with another sequence of the drive and look at the residual',
+                *(f'what is like {name} shows best so: {effects[name].experiment}'
+                  for name in missing)])
         for name, others in zip(missing, alternatives):
             if others:
                 return (f'to tell {name} from {" and ".join(others)}: '

@@ -13,14 +13,12 @@ import itertools
 
 import numpy as np
 
-from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.candidates import (
-    changes_beside, consider_all, consider_beside, hopeful, possible, present)
+    changes_beside, consider_all, consider_beside, hopeful, possible)
 from hysteresis_ros.diagnosis.evidence import Evidence, PRACTICAL, SIGNIFICANCE
-from hysteresis_ros.diagnosis.fit import beside, Fitter
-from hysteresis_ros.diagnosis.parameters import starts_of
+from hysteresis_ros.diagnosis.extrapolation import Extrapolation, promising
+from hysteresis_ros.diagnosis.fit import Fitter
 from hysteresis_ros.diagnosis.sets import consider_sets, finish_sets, subsets, try_sets
-from hysteresis_ros.effects import catalogue
 
 MOST_EFFECTS = 3
 # What is added to others has to take this share off the first error, or a user would not see it.
@@ -31,8 +29,6 @@ MOST_SEEDS = 2
 MOST_IN_SETS = 5
 # Effects that are fitted beside those found, the most promising of a straight extrapolation.
 MOST_RIVALS = 8
-# Starts of each that such an extrapolation leaves.
-MOST_STARTS = 3
 # Numbers of pairs that are fitted one after the other until one explains it all, and how many of
 # the best are then fitted to the end, by whether rows are settled: a continuous one takes longer.
 BATCHES = {True: (12, 12, 12, 12, 12), False: (8,)}
@@ -92,12 +88,12 @@ class Search:
         self.base = self.found = self.refit([])
         self.evidence = Evidence(problem, self.fixed, self.base.predicted, self.rng)
         self.rivals, self.strange = [], []
-        self._changes = {}
         # Fits of one more effect beside those that were known, by their names.
         self._beside = {}
         names, self.hopeless = possible(problem, [])
         self.first = consider_all(self.fitter, self.base, names, jobs, progress)
         self._beside[frozenset()] = self._judged(self.first, self.base)
+        self.extrapolation = Extrapolation(problem, self.base, self.first)
 
     def error(self, fit) -> float:
         """Return the held-out RMSE of a fit."""
@@ -145,8 +141,9 @@ class Search:
                       if fit.effects[-1].id not in taken]
             if others:
                 fitted = {fit.effects[-1].id for fit in rivals} | taken
-                sets = self._in_order([[*others, candidate.effect] for candidate in self.first
-                                       if candidate.id not in fitted])
+                sets = self.extrapolation.in_order([
+                    [*others, candidate.effect] for candidate in self.first
+                    if candidate.id not in fitted])
                 rivals += self._fitted(sets[:RIVALS[self.problem.settled]])
             close = [fit for fit in sorted(rivals, key=self.error) if not fit.implausible()
                      and self.evidence.could_be(fit, self.found)]
@@ -177,18 +174,21 @@ class Search:
                 if not any(name in named for named in alternatives):
                     alternatives[place].append(name)
 
-    def stood_in_for(self) -> bool:
+    def stand_in(self):
         """
-        Whether no more effects than those found explain far more with values that are not physical.
+        Return the fit of no more effects that explains far more with values that are not physical.
 
-        Then what is missing is like them, and is neither them nor what was found.
+        Then what is missing is like them, and is neither them nor what was found. None if there
+        is no such fit, or what was found leaves no more than it may.
         """
         found = self.error(self.found)
+        if found <= self.evidence.enough:
+            return None
         strange = self.strange + [candidate.fit for candidate in self.first
                                   if candidate.fit.implausible()]
-        return found > self.evidence.enough and any(
-            len(fit.effects) <= len(self.found.effects) and self.error(fit) < STRANGE * found
-            for fit in strange)
+        best = min((fit for fit in strange if len(fit.effects) <= len(self.found.effects)),
+                   key=self.error, default=None)
+        return best if best and self.error(best) < STRANGE * found else None
 
     def _on_bench(self):
         """
@@ -278,57 +278,8 @@ class Search:
         limit = (1.0 - PRACTICAL) * float(np.mean(left ** 2))
         names, _ = possible(self.problem, fit.effects)
         candidates = [candidate for candidate in self.first if candidate.id in names]
-        looks = []
-        for changes in changes_beside(
-                self.fitter, fit.effects, candidates, self.jobs, self.progress):
-            # A single column more cannot explain much by chance, and a drift that is foretold for
-            # a trial would count against whatever stands beside it.
-            worth = [float(np.mean(significance.residualise(
-                np.column_stack([fit.jacobian, change]), left) ** 2)) for _, change in changes]
-            order = np.argsort(worth, kind='stable')
-            looks.append((worth[order[0]], [changes[index][0] for index in order[:MOST_STARTS]]))
-        looks.sort(key=lambda look: look[0])
-        return [starts for worth, starts in looks[:MOST_RIVALS] if worth < limit]
-
-    def _straight(self, columns, left) -> float:
-        """Return the held-out mean square error of a straight extrapolation."""
-        return significance.held_out_errors(
-            np.column_stack(columns), left[None, :], self.problem.fold)[0]
-
-    def _change_of(self, candidate) -> np.ndarray:
-        """
-        Return what an effect can change, shape (n, k), for a straight extrapolation.
-
-        As it was fitted by itself and nearby, and at its starts: fitted by itself it may be far
-        from what it is beside another.
-        """
-        if candidate.id not in self._changes:
-            effect = present(self.problem.model, catalogue()[candidate.id])
-            changes = [
-                self.problem.simulate([*beside(self.fixed, [start]), start]) - self.base.predicted
-                for start in starts_of(effect, self.problem.kind)]
-            columns = np.column_stack([candidate.signature, candidate.fit.jacobian, *changes])
-            self._changes[candidate.id] = np.where(
-                np.all(np.isfinite(columns), axis=0), columns, 0.0)
-        return self._changes[candidate.id]
-
-    def _in_order(self, sets) -> list:
-        """
-        Return sets of effects in the order of a straight extrapolation, the most promising first.
-
-        In turn from two extrapolations, from what each effect is by itself with its starts, and
-        without them: neither is right for every effect.
-        """
-        left = self.problem.measured - self.base.predicted
-        near = {candidate.id: np.column_stack([candidate.signature, candidate.fit.jacobian])
-                for candidate in self.first}
-        wide = {candidate.id: self._change_of(candidate) for candidate in self.first}
-        orders = []
-        for columns in (wide, near):
-            worth = [self._straight([columns[effect.id] for effect in one], left) for one in sets]
-            orders.append(sorted(range(len(sets)), key=worth.__getitem__))
-        order = dict.fromkeys(itertools.chain.from_iterable(zip(*orders)))
-        return [sets[index] for index in order]
+        changes = changes_beside(self.fitter, fit.effects, candidates, self.jobs, self.progress)
+        return promising(changes, fit.jacobian, left, limit)[:MOST_RIVALS]
 
     def _pairs(self, grown) -> list:
         """
@@ -337,7 +288,7 @@ class Search:
         Kept are those that explain more than the best single effect would with chance's help.
         """
         tried = {_names(fit.effects) for fits in self._beside.values() for fit in fits}
-        pairs = self._in_order([pair for pair in subsets(
+        pairs = self.extrapolation.in_order([pair for pair in subsets(
             [candidate.effect for candidate in self.first], 2)
                                 if len(pair) == 2 and _names(pair) not in tried])
         singles = [fit for fit in grown if len(fit.effects) == 1] or [self.base]

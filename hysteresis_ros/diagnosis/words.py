@@ -31,14 +31,16 @@ def verdict_in_words(found) -> str:
                 + f' Adding {"them" if len(parts) > 1 else "it"} takes {share:.0f} % off the '
                 'error.')
     if found.verdict == 'unknown':
-        text = ('Unknown: something acts here that no effect of the catalogue explains '
-                f'({100.0 * found.unexplained:.0f} % of the mean square error).')
+        if found.resembles:
+            text = (f'Unknown: something acts here that is like {" with ".join(found.resembles)}, '
+                    'but only values that are not physical would explain it.')
+        else:
+            text = ('Unknown: something acts here that no effect of the catalogue explains '
+                    f'({100.0 * found.unexplained:.0f} % of the mean square error).')
         if found.event is not None:
             text += f' It happened at {found.event:.0f} s and lasts.'
         elif found.signal:
             text += f' It shows in {found.signal}.'
-        if found.missing:
-            text += f' The effects that explain most of it are {", ".join(found.missing)}.'
         return text
     if found.verdict == 'not_excited':
         return ('Not excited: this recording moves too little to show whether an effect is '
