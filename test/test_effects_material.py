@@ -152,7 +152,7 @@ def test_creep_goes_on_with_the_logarithm_of_time_in_the_direction_of_the_step()
     # What the first step has left fades while the second creeps.
     left = -unit * 0.6 * math.log1p(6.0 / 2.0)
     expected = [0.0, -unit * 0.6 * math.log1p(1.0 / 2.0), left,
-                left, left * math.exp(-4.0 / 2.0) + unit * 0.3 * math.log1p(4.0 / 2.0)]
+                left, left * math.exp(-2.0 * 4.0 / 2.0) + unit * 0.3 * math.log1p(4.0 / 2.0)]
     np.testing.assert_allclose(offset, expected, atol=1e-18)
     assert np.all(factor == 1.0)
 

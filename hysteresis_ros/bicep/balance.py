@@ -100,6 +100,11 @@ class ArmBalance:
         self._x, self._ringing = math.inf, False
         self._jerk = self._acceleration = 0.0
 
+    @property
+    def output(self) -> float:
+        """Output of H2 [m], which follows the martensite share; the mean of the muscles."""
+        return self._bundle.output if self._bundle else self.operators[0].output
+
     def settle(self, x: float) -> float:
         """Take up the state of rest under `x`, the cold one, and return its angle [rad]."""
         self._angle = None

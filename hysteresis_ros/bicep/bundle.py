@@ -46,6 +46,12 @@ class Bundle:
         self.operators = [copy.deepcopy(operator) for _ in offsets]
         self._gain = 1.0
 
+    @property
+    def output(self) -> float:
+        """What the transformation gives [m], the mean of the muscles."""
+        return sum(operator.output - self._inside * (operator.input - self._middle)
+                   for operator in self.operators) / len(self.operators)
+
     def inputs(self, output: float, mean: float) -> list[float]:
         """
         Return each muscle's input ``u_i = F_i - x``.

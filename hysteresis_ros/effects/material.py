@@ -206,7 +206,7 @@ class Creep(MaterialEffect):
     sentence = 'After a step the muscle goes on moving the same way, with the logarithm of time.'
     equation = ('L += c l0 dxi ln(1 + t / t0), t since the last step and dxi the change of the '
                 'martensite share by it, and that of the steps before, which fades with '
-                'exp(-t / t0); where kept is 1, the logarithms of all steps so far')
+                'exp(-2 t / t0); where kept is 1, the logarithms of all steps so far')
     source = "logarithmic creep of what has just transformed; Boltzmann's superposition (kept = 1)"
     shows_in = 'log time in a hold'
     experiment = 'holds of 300 s'
@@ -232,6 +232,9 @@ class Creep(MaterialEffect):
     # A change of the drive by less than this share of its range is a hold.
     HOLD = 1e-3
 
+    # How much faster than t0 what earlier steps have left fades.
+    FADING = 2.0
+
     def start(self):
         """Forget the past: cold, before the first step."""
         self._since = self._drive = None
@@ -248,7 +251,7 @@ class Creep(MaterialEffect):
         direction = 0.0
         if abs(change) > self.HOLD * surroundings.drive_range:
             direction = math.copysign(1.0, change)
-        self._left *= math.exp(-inputs.step / self.t0)
+        self._left *= math.exp(-self.FADING * inputs.step / self.t0)
         if direction != 0.0:
             if direction != self._direction:
                 self._before = self._phase
@@ -280,11 +283,12 @@ class Creep(MaterialEffect):
     def _fading(self, strain, begun, inputs):
         """Return what earlier runs of the drive have left, given the rows where runs begin."""
         left, carried = np.zeros(len(strain)), 0.0
-        clock = np.cumsum(inputs.step)
+        clock = self.FADING / self.t0 * np.cumsum(inputs.step)
         for row, end in zip(begun, [*begun[1:], len(strain)]):
             if row > 0:
-                carried = left[row - 1] * math.exp(-inputs.step[row] / self.t0) + strain[row - 1]
-            left[row:end] = carried * np.exp((clock[row] - clock[row:end]) / self.t0)
+                carried = (left[row - 1] * math.exp(clock[row - 1] - clock[row])
+                           + strain[row - 1])
+            left[row:end] = carried * np.exp(clock[row] - clock[row:end])
         return left
 
     def _decays(self, step):

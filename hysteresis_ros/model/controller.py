@@ -310,13 +310,13 @@ class Controller:
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
             self._muscles.settle_cold(self._cold, load, self._at_rest()[1] if self._arm else None)
-        inputs = self._inputs(0.0, float(self.model.martensite(length)), ambient)
+        inputs = self._inputs(0.0, self._share(length, force), ambient)
         find = self._search if self._steady.drifts else self._invert
         drive, saturated = find(length, force, load, inputs)
         outcome = self._outcome(drive, force, load, inputs)
         if saturated and self._chain.needs_phase:
             for _ in range(PHASE_PASSES):
-                inputs = inputs._replace(phase=float(self.model.martensite(outcome.length)))
+                inputs = inputs._replace(phase=self._share(outcome.length, force))
                 outcome = self._outcome(drive, force, load, inputs)
         applied = self._commit(drive, outcome, inputs, time)
         reason = ''
@@ -326,12 +326,20 @@ class Controller:
                       f'{limits} {self.model.drive}; expected {1e3 * outcome.length:.3f} mm')
         return Setpoint(applied, saturated, outcome.length, outcome.length - length, reason)
 
-    def _invert(self, length, force, load, inputs):
-        """Drive in closed form, and whether it is out of reach."""
+    def _transformed(self, length, force):
+        """Return what the transformation has to give for a length [m] under a force [N]."""
         base = self._muscles.base
         scale = float(self._chain.scale(np.float64(force)))
-        wanted = base + (length - base - float(self._chain.stretch(np.float64(force)))) / scale
-        x, out_of_reach = self._muscles.drive(wanted, load, self.dead_band)
+        return base + (length - base - float(self._chain.stretch(np.float64(force)))) / scale
+
+    def _share(self, length, force):
+        """Return the share of martensite at a length [m] under a force [N]."""
+        return float(self.model.martensite(self._transformed(length, force)))
+
+    def _invert(self, length, force, load, inputs):
+        """Drive in closed form, and whether it is out of reach."""
+        x, out_of_reach = self._muscles.drive(
+            self._transformed(length, force), load, self.dead_band)
         heat, saturated = self._first.invert(x)
         drive, clipped = self._clip(self._steady.inverse(heat, inputs))
         return drive, out_of_reach or saturated or clipped

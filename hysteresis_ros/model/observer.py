@@ -91,7 +91,7 @@ class Observer:
         offset, factor = self._chain.advance(drive, heat, inputs)
         angle = self._balance.step(self._first.step(heat), dt, offset, factor)
         if self._chain.needs_phase:
-            self._phase = float(self.model.martensite(self.model.geometry.length(angle)))
+            self._phase = float(self.model.martensite(self._balance.output))
         for effect in self._chain.sensor:
             angle = effect.step(angle, dt)
         return angle

@@ -202,8 +202,7 @@ class Simulator:
             balance = self.model.balance(chain)
 
             def respond(trial, inputs):
-                angle = self._angle(chain, first, balance, trial, inputs, inputs_of_stage)
-                return angle, self.model.geometry.length(angle)
+                return self._angle(chain, first, balance, trial, inputs, inputs_of_stage)
             return respond
         stage = self.model.require_length_stage()
         return lambda trial, inputs: self._length(chain, first, stage, trial, inputs)
@@ -243,16 +242,18 @@ class Simulator:
         steps = np.diff(np.cumsum(inputs.step)[chosen], prepend=0.0).tolist()
         balance.start()
         self._rest = balance.settle(cold)
-        angles, stage_inputs = [], []
+        angles, outputs, stage_inputs = [], [], []
         for row in zip(x[chosen].tolist(), steps, offset[chosen].tolist(),
                        factor[chosen].tolist()):
             angles.append(balance.step(*row))
+            outputs.append(balance.output)
             stage_inputs.append(balance.operators[0].input)
         if inputs_of_stage is not None:
             inputs_of_stage.append((np.array(stage_inputs), chosen, len(x)))
         if len(chosen) == len(x):
-            return np.array(angles)
-        return np.interp(inputs.time, inputs.time[chosen], angles)
+            return np.array(angles), np.array(outputs)
+        return tuple(np.interp(inputs.time, inputs.time[chosen], column)
+                     for column in (angles, outputs))
 
     def _chosen_rows(self, start, cold, x):
         rows = np.arange(len(x))
