@@ -190,7 +190,7 @@ def outputs_given(monkeypatch):
 
 
 def test_only_what_transforms_counts_as_transformation_on_an_arm(monkeypatch):
-    """Creep and elastic stretch move the arm, too; taken for martensite, creep would feed itself."""
+    """Creep and elastic stretch move the arm, too; as martensite, creep would feed itself."""
     model = bicep_model(['series_compliance'])
     creep = effect_of(model, 'creep', c=0.3, t0=2.0)
     given = outputs_given(monkeypatch)
