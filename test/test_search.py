@@ -216,3 +216,19 @@ def test_values_that_are_not_physical_but_explain_far_more_show_an_unknown(
     assert (search.stand_in() is one) == better
     search.evidence = SimpleNamespace(enough=1.1)
     assert search.stand_in() is None
+
+
+@pytest.mark.parametrize('left, expected', [(0.5, 'two'), (0.12, 'sound')])
+def test_what_stood_in_for_the_newest_effect_gives_way_to_it(monkeypatch, left, expected):
+    """With three effects one is not physical but all is explained: two of them are the cause."""
+    monkeypatch.setattr(Fit, 'implausible', lambda self: self.effects[0].id == 'odd')
+    search = searching(fit(1.0))
+    search.evidence = SimpleNamespace(floor=0.1, enough=0.16)
+    odd, sound = fit(0.11, names=('odd', 'rub', 'tilt')), fit(left, names=('sag', 'rub', 'air'))
+    two = fit(0.11, names=('rub', 'tilt'))
+    search.consider = lambda *_: [SimpleNamespace(fit=odd), SimpleNamespace(fit=sound)]
+    search._worth_another_look = search._significant = search._matters = lambda *_: True
+    search._simplest = lambda rivals: rivals[:1]
+    search.refit = lambda effects: sound
+    search._without_needless = lambda found: two if found is odd else found
+    assert search._grow(fit(0.8, names=('sag', 'rub'))) is {'two': two, 'sound': sound}[expected]

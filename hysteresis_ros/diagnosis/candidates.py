@@ -216,7 +216,7 @@ def finite(fit) -> Fit | None:
     return fit if np.all(np.isfinite(judged)) and np.all(np.isfinite(fit.jacobian)) else None
 
 
-def changes_beside(fitter, effects, candidates, jobs: int,
+def changes_beside(problem, effects, candidates, jobs: int,
                    progress) -> list[list[tuple[Effect, np.ndarray]]]:
     """
     Return what each candidate changes beside other effects, from each of its starts.
@@ -226,8 +226,8 @@ def changes_beside(fitter, effects, candidates, jobs: int,
 
     Parameters
     ----------
-    fitter : Fitter
-        For the problem.
+    problem : Problem
+        Rows and model.
     effects : sequence of Effect
         The others, with values.
     candidates : sequence of Candidate
@@ -240,7 +240,6 @@ def changes_beside(fitter, effects, candidates, jobs: int,
     list of list of (Effect, ndarray of shape (n,))
         For each candidate its starts with what they change.
     """
-    problem = fitter.problem
     effects = [effect for effect in effects
                if not (effect.needs_phase or getattr(effect, 'moves', False))]
     without = problem.simulate([*beside(problem.model.effects, effects), *effects])

@@ -258,7 +258,8 @@ class Search:
                       if self._matters(rival.fit, fit) and self._significant(rival, fit)]
             plausible = [rival for rival in rivals if not rival.fit.implausible()]
             chosen = self._simplest(plausible or (rivals if fit.implausible() else []))
-            if rivals and not plausible and not self._leaves(rivals[0].fit):
+            if (rivals and not self._leaves(rivals[0].fit)
+                    and all(self._leaves(rival.fit) for rival in plausible)):
                 # What has stood in for the newest is not needed any more.
                 without = self._without_needless(rivals[0].fit)
                 if not without.implausible():
@@ -278,7 +279,7 @@ class Search:
         limit = (1.0 - PRACTICAL) * float(np.mean(left ** 2))
         names, _ = possible(self.problem, fit.effects)
         candidates = [candidate for candidate in self.first if candidate.id in names]
-        changes = changes_beside(self.fitter, fit.effects, candidates, self.jobs, self.progress)
+        changes = changes_beside(self.problem, fit.effects, candidates, self.jobs, self.progress)
         return promising(changes, fit.jacobian, left, limit)[:MOST_RIVALS]
 
     def _pairs(self, grown) -> list:
