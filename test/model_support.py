@@ -37,6 +37,10 @@ STRENGTHS = {
 }
 
 
+# Rows of a trial.
+ROWS = 60
+
+
 def preisach(lower, upper, levels, lowest, highest, width):
     """Operator with weights near the line alpha - beta = width and an output range."""
     nodes = np.linspace(lower, upper, levels + 1)
@@ -88,3 +92,16 @@ def wandering_voltage(rows, seed=0):
     waves = sum(math.sin(phase) + np.sin(2 * math.pi * time / period + phase)
                 for period, phase in zip(rng.uniform(40, 400, 5), rng.uniform(0, 6.28, 5)))
     return 6.0 * (waves - waves.min()) / np.ptp(waves)
+
+
+def runs(model, trials=3, rows=ROWS, seed=0, step=30.0, sizes=None):
+    """Return an arm run of some settled trials that the model itself has made."""
+    sizes = sizes or [rows] * trials
+    voltage = np.concatenate([
+        wandering_voltage(400, seed + trial)[::400 // size][:size]
+        for trial, size in enumerate(sizes)])
+    trial = np.repeat(np.arange(float(len(sizes))), sizes)
+    time = step * np.concatenate([1.0 + np.arange(size) for size in sizes])
+    columns = {'time': time, 'trial': trial, 'voltage': voltage, 'angle': np.ones(len(voltage))}
+    angle = model.predict(Measurement.from_columns(columns))
+    return Measurement.from_columns({**columns, 'angle': angle})
