@@ -13,7 +13,7 @@ from hysteresis_ros.diagnosis.candidates import begin, consider, finish
 from hysteresis_ros.diagnosis.derivatives import Derivatives
 from hysteresis_ros.diagnosis.fit import Fitter
 from hysteresis_ros.diagnosis.kind import problem_for
-from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of, usual
 from hysteresis_ros.effects import catalogue
 
 
@@ -189,3 +189,33 @@ def test_a_fit_that_goes_on_does_not_simulate_again_what_it_knows(problem, monke
     rough = dataclasses.replace(begun, jacobian=1.1 * begun.jacobian, rough=True)
     exact = fitter.cross_validate([], rough)
     assert exact.jacobian == pytest.approx(begun.jacobian) and not exact.rough
+
+
+def test_usual_values_keep_what_is_chosen_and_not_fitted():
+    """The start in the middle, so that nothing of a former fit is left but a choice."""
+    model = bicep_model()
+    payload, creep = usual([effect_of(model, 'payload_error', dm=44.0),
+                            effect_of(model, 'creep', c=0.4, t0=9.0, kept=1.0)], 'arm')
+    assert payload.values['dm'] in {start.values['dm'] for start in starts_of(payload, 'arm')}
+    assert payload.values['dm'] != 44.0
+    assert creep.values['kept'] == 1.0 and creep.values['t0'] == 3.0
+
+
+@pytest.mark.parametrize('names, count', [(['payload_error', 'supply_sag'], 2),
+                                          (['viscous_friction', 'supply_sag'], 1),
+                                          (['supply_sag'], 1)])
+def test_beside_others_a_fit_begins_from_usual_values_too(problem, monkeypatch, names, count):
+    """But where a simulation takes long; by itself an effect has no other's values to hold it."""
+    fitter = Fitter(problem)
+    *known, new = [effect_of(problem.model, name) for name in names]
+    begun = []
+    fit = fitter.fit
+
+    def counting(fixed, effects, *rest, **options):
+        begun.append([effect.values for effect in effects])
+        return fit(fixed, effects, *rest, **options)
+    monkeypatch.setattr(fitter, 'fit', counting)
+    begin(fitter, known, [new])
+    assert len(begun) == count and begun[0] == [effect.values for effect in (*known, new)]
+    if count > 1:
+        assert begun[1] == [effect.values for effect in usual([*known, new], 'arm')]

@@ -8,8 +8,8 @@ import math
 import joblib
 import numpy as np
 
-from hysteresis_ros.diagnosis.fit import beside, Fit
-from hysteresis_ros.diagnosis.parameters import starts_of
+from hysteresis_ros.diagnosis.fit import beside, FIRST_EVALUATIONS, Fit
+from hysteresis_ros.diagnosis.parameters import starts_of, usual
 from hysteresis_ros.effects import catalogue, Effect
 
 # A recorded temperature [degC] that changes by less is a constant with noise on it.
@@ -97,6 +97,9 @@ def begin(fitter, known, starts) -> Fit | None:
     """
     Fit one effect for a few steps.
 
+    Beside others from their values, and from usual values of all, where that does not take long:
+    what stood in for the new effect may hold its own values fast.
+
     Parameters
     ----------
     fitter : Fitter
@@ -112,8 +115,18 @@ def begin(fitter, known, starts) -> Fit | None:
         None if the simulation with it is not finite.
     """
     others = [effect for effect in known if effect.id not in starts[0].replaces]
+    fixed, together = fitter.problem.model.effects, [*others, starts[0]]
     with np.errstate(all='ignore'):
-        return finite(fitter.begin(fitter.problem.model.effects, others, starts))
+        fits = [fitter.begin(fixed, others, starts)]
+        if others and not any(map(_takes_long, together)):
+            fits.append(fitter.fit(fixed, usual(together, fitter.problem.kind),
+                                   evaluations=FIRST_EVALUATIONS))
+        return finite(min(fits, key=lambda fit: fitter.error(fit.predicted)))
+
+
+def _takes_long(effect) -> bool:
+    """Whether simulations with an effect take long: what follows the phase, or moves the arm."""
+    return effect.needs_phase or getattr(effect, 'moves', False)
 
 
 def finish(fitter, current: Fit, fit: Fit) -> Candidate | None:
@@ -240,8 +253,7 @@ def changes_beside(problem, effects, candidates, jobs: int,
     list of list of (Effect, ndarray of shape (n,))
         For each candidate its starts with what they change.
     """
-    effects = [effect for effect in effects
-               if not (effect.needs_phase or getattr(effect, 'moves', False))]
+    effects = [effect for effect in effects if not _takes_long(effect)]
     without = problem.simulate([*beside(problem.model.effects, effects), *effects])
     tasks = [joblib.delayed(_changes)(problem, effects, candidate.effect, without)
              for candidate in candidates]

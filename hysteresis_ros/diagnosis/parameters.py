@@ -90,3 +90,14 @@ def starts_of(effect, kind: str, most: int = 14) -> list:
     return [effect.with_values(**{parameter.name: value
                                   for parameter, value in zip(fitted, combination)})
             for combination in combinations]
+
+
+def usual(effects, kind: str) -> list:
+    """Return copies of effects at usual values; what is chosen, not fitted, stays."""
+    found = []
+    for effect in effects:
+        starts = starts_of(effect, kind)
+        found.append(starts[len(starts) // 2].with_values(**{
+            parameter.name: effect.values[parameter.name]
+            for parameter in effect.parameters if parameter.choices}))
+    return found

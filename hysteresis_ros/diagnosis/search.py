@@ -33,11 +33,11 @@ MOST_RIVALS = 8
 # the best are then fitted to the end, by whether rows are settled: a continuous one takes longer.
 BATCHES = {True: (12, 12, 12, 12, 12), False: (8,)}
 MOST_PAIRS = {True: 4, False: 2}
-# Only so many of the batches where a single effect leaves less than this many times as much as
-# ends the search: pairs have little more to explain.
+# Only so many of the batches where a set leaves less than this many times as much as ends the
+# search: pairs have little more to explain.
 FEW_BATCHES, NEARLY = 1, 2.0
-# Sets that are begun, by whether rows are settled, for the alternatives to each effect of a set.
-RIVALS = {True: 6, False: 3}
+# Sets that are begun for the alternatives to each effect of a set.
+RIVALS = 6
 MOST_ALTERNATIVES = 3
 # What leaves less than this share of what the effects found leave explains far more.
 STRANGE = 0.6
@@ -144,7 +144,7 @@ class Search:
                 sets = self.extrapolation.in_order([
                     [*others, candidate.effect] for candidate in self.first
                     if candidate.id not in fitted])
-                rivals += self._fitted(sets[:RIVALS[self.problem.settled]])
+                rivals += self._fitted(sets[:RIVALS])
             close = [fit for fit in sorted(rivals, key=self.error) if not fit.implausible()
                      and self.evidence.could_be(fit, self.found)]
             result.append([fit.effects[-1].id for fit in close[:MOST_ALTERNATIVES]])
@@ -209,11 +209,10 @@ class Search:
         for seed in self._seeds():
             fit = self._grow(seed.fit)
             (self.strange if fit.implausible() else sets).append(fit)
-            # Three effects may do what two others are the cause of.
-            few = [fit for fit in [self.base, *sets] if len(fit.effects) < MOST_EFFECTS]
-            if not all(self._leaves(fit) for fit in few):
+            # Several effects may do what two others are the cause of.
+            if any(len(fit.effects) == 1 and not self._leaves(fit) for fit in sets):
                 return sets
-        return sets + self._pairs(sets)
+        return sets + self._pairs(sets) if self._leaves(self.base) else sets
 
     def _seeds(self):
         significant = [candidate for candidate in self.first
@@ -296,7 +295,7 @@ class Search:
         single = min(singles, key=self.error)
         fits, waiting, settled = [], iter(pairs), self.problem.settled
         batches = BATCHES[settled]
-        if self.error(single) <= NEARLY * self.evidence.enough:
+        if any(self.error(fit) <= NEARLY * self.evidence.enough for fit in grown):
             batches = batches[:FEW_BATCHES]
         for count in batches:
             chosen = list(itertools.islice(waiting, count))

@@ -8,32 +8,25 @@ import joblib
 import numpy as np
 
 from hysteresis_ros.diagnosis.candidates import finite, in_parallel
-from hysteresis_ros.diagnosis.fit import beside, FIRST_EVALUATIONS, Fit
-from hysteresis_ros.diagnosis.parameters import starts_of
+from hysteresis_ros.diagnosis.fit import Fit
+from hysteresis_ros.diagnosis.parameters import usual
+
+# Steps of what is begun, by whether rows are settled; others take longer.
+EVALUATIONS = {True: 8, False: 4}
 
 
 def _starts(effects, kind) -> tuple[list, list]:
     """Return usual values of some effects, and those that each had alone."""
-    usual = []
-    for effect in effects:
-        starts = starts_of(effect, kind)
-        # What is not fitted but chosen was chosen well by the effect alone.
-        usual.append(starts[len(starts) // 2].with_values(**{
-            parameter.name: effect.values[parameter.name]
-            for parameter in effect.parameters if parameter.choices}))
-    return usual, list(effects)
+    return usual(effects, kind), list(effects)
 
 
 def _try_set(fitter, effects) -> Fit | None:
-    """Fit some effects together for a few steps from the better start."""
+    """Fit some effects together for a few steps from both starts; which is better shows then."""
     problem = fitter.problem
-
-    def error(start):
-        predicted = problem.simulate([*beside(problem.model.effects, start), *start])
-        return fitter.error(predicted)
     with np.errstate(all='ignore'):
-        start = min(_starts(effects, problem.kind), key=error)
-        return finite(fitter.fit(problem.model.effects, start, evaluations=FIRST_EVALUATIONS))
+        fits = (fitter.fit(problem.model.effects, start, evaluations=EVALUATIONS[problem.settled])
+                for start in _starts(effects, problem.kind))
+        return finite(min(fits, key=lambda fit: fitter.error(fit.predicted)))
 
 
 def _finish_set(fitter, fit) -> Fit | None:
