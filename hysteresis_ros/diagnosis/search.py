@@ -212,7 +212,9 @@ class Search:
             # Several effects may do what two others are the cause of.
             if any(len(fit.effects) == 1 and not self._leaves(fit) for fit in sets):
                 return sets
-        return sets + self._pairs(sets) if self._leaves(self.base) else sets
+        if not self._leaves(self.base):
+            return sets
+        return sets + self._pairs(sets)
 
     def _seeds(self):
         significant = [candidate for candidate in self.first
