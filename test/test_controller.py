@@ -56,9 +56,10 @@ def test_the_models_own_arm_reaches_every_target(names):
     np.testing.assert_allclose(angles, targets, rtol=0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize('name', PHASE)
-def test_the_arm_reaches_targets_once_the_phase_agrees(name):
-    angles, setpoints = drive_arm(bicep_model([name]), repeats=20)
+@pytest.mark.parametrize('names', [*((name,) for name in PHASE),
+                                   ('resistance_change', 'series_compliance')])
+def test_the_arm_reaches_targets_once_the_phase_agrees(names):
+    angles, setpoints = drive_arm(bicep_model(names), repeats=20)
     assert max(abs(setpoint.error) for setpoint in setpoints) < 1e-12
     np.testing.assert_allclose(angles, TARGETS, rtol=0.0, atol=2e-4)
 

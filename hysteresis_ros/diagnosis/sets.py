@@ -12,7 +12,7 @@ from hysteresis_ros.diagnosis.fit import Fit
 from hysteresis_ros.diagnosis.parameters import usual
 
 # Steps of what is begun, by whether rows are settled; others take longer.
-EVALUATIONS = {True: 8, False: 4}
+BEGUN_EVALUATIONS = {True: 8, False: 4}
 
 
 def _starts(effects, kind) -> tuple[list, list]:
@@ -24,7 +24,8 @@ def _try_set(fitter, effects) -> Fit | None:
     """Fit some effects together for a few steps from both starts; which is better shows then."""
     problem = fitter.problem
     with np.errstate(all='ignore'):
-        fits = (fitter.fit(problem.model.effects, start, evaluations=EVALUATIONS[problem.settled])
+        steps = BEGUN_EVALUATIONS[problem.settled]
+        fits = (fitter.fit(problem.model.effects, start, evaluations=steps)
                 for start in _starts(effects, problem.kind))
         return finite(min(fits, key=lambda fit: fitter.error(fit.predicted)))
 

@@ -119,10 +119,10 @@ class MuscleModel:
         low, high = self.ranges.get(self.drive, (0.0, 1.0))
         return max(high - low, 1e-12)
 
-    def martensite(self, length):
-        """Return the share of the cold phase at an elongation, 0 to 1; arrays of any shape."""
+    def martensite(self, output):
+        """Return the share of the cold phase at an output of H2 [m], 0 to 1, of any shape."""
         low, high = self.require_length_range()
-        share = np.clip((length - low) / max(high - low, 1e-12), 0.0, 1.0)
+        share = np.clip((output - low) / max(high - low, 1e-12), 0.0, 1.0)
         return share if self.sign < 0 else 1.0 - share
 
     def predict(self, measurement, method: str = 'preisach') -> np.ndarray:
