@@ -8,6 +8,7 @@ import signal
 import time
 
 from node_support import Graph, process
+import numpy as np
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
@@ -94,7 +95,8 @@ def test_setpoint_moves_the_arm(bridge, graph):
     stamps = [1e-9 * (joint.header.stamp.sec * 10 ** 9 + joint.header.stamp.nanosec)
               for joint in one.joints]
     assert stamps == sorted(stamps)
-    assert stamps[-1] - stamps[0] == pytest.approx(0.5 * (len(stamps) - 1), abs=0.6)
+    # The median: a busy machine may lose a message.
+    assert np.median(np.diff(stamps)) == pytest.approx(0.5, abs=0.1)
 
 
 def test_clock_runs_with_the_board(bridge, graph):

@@ -27,6 +27,11 @@ class Ending(Node):
     def wait(self):
         pass
 
+    def work(self):
+        print('begun', flush=True)
+        time.sleep(0.3)
+        print('done', flush=True)
+
     def fail(self):
         raise BoardError('the board at\\n/dev/x is silent')
 
@@ -62,6 +67,16 @@ def test_a_second_signal_does_not_cut_the_end(domain_id, first, second):
     child.send_signal(second)
     output, errors = child.communicate(timeout=20)
     assert (child.returncode, output, errors) == (0, 'zero\n', '')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_what_has_begun_comes_to_its_end(domain_id, number):
+    """No exception cuts a message in half, and none is printed."""
+    child = begin('work')
+    assert child.stdout.readline() == 'begun\n'
+    child.send_signal(number)
+    output, errors = child.communicate(timeout=20)
+    assert (child.returncode, output, errors) == (0, 'done\nzero\n', '')
 
 
 def test_an_error_that_a_user_can_mend_is_one_line(domain_id):

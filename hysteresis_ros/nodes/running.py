@@ -4,11 +4,14 @@
 
 import gc
 import signal
+import socket
 import sys
+import threading
 from collections.abc import Callable, Sequence
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 
 from hysteresis_ros.errors import HysteresisError, ParameterError
 
@@ -39,44 +42,63 @@ def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
     """
     node = None
     status = 0
-    # Signals wait until the node is there: half a node could not say its last words.
-    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    ending = Ending()
     try:
         _start_rclpy(args)
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
+        ending.call(executor.wake)
         # What is there now stays for good: collections need not look at it between two messages.
         gc.freeze()
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except RuntimeError:
-        # SIGTERM shuts rclpy down from a thread of its own, in the middle of anything.
-        if rclpy.ok():
-            raise
+        while not ending.has_come:
+            executor.spin_once()
     except (HysteresisError, OSError) as error:
         status = _fail(error)
     finally:
-        _ignore_signals()
         status = _end(node) or status
-        # Shutting rclpy down put the signal handlers back that it had found.
-        _ignore_signals()
+        # Python puts the default handlers back on its way out: a signal then would be the status.
+        for number in ENDING:
+            signal.signal(number, signal.SIG_IGN)
     return status
+
+
+class Ending:
+    """
+    Takes Ctrl-C and SIGTERM, and lets what is going on come to its end first.
+
+    Neither an exception in the middle of anything nor rclpy shut down from another thread: half a
+    node or half a message could not say its last words. `ros2 launch` signals every node twice;
+    the second signal changes nothing.
+    """
+
+    def __init__(self):
+        self.has_come = False
+        self._wake = None
+        self._heard, self._signalled = socket.socketpair()
+        self._signalled.setblocking(False)
+        for number in ENDING:
+            signal.signal(number, lambda *_: None)
+        # The main thread waits inside DDS, where Python runs no signal handlers.
+        signal.set_wakeup_fd(self._signalled.fileno(), warn_on_full_buffer=False)
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def call(self, wake: Callable) -> None:
+        """Have `wake`, which takes nothing, called from another thread when the end comes."""
+        self._wake = wake
+
+    def _listen(self):
+        self._heard.recv(1)
+        self.has_come = True
+        if self._wake is not None:
+            self._wake()
 
 
 def _start_rclpy(args):
     try:
-        rclpy.init(args=args)
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:   # what rclpy makes of arguments that it cannot read
         raise ParameterError(f'ROS arguments: {error}') from None
-
-
-def _ignore_signals():
-    """Ctrl-C on ``ros2 launch`` signals every node twice: the second must not cut the end."""
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
 
 
 def _end(node):
