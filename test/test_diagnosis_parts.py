@@ -14,7 +14,7 @@ from hysteresis_ros.diagnosis.leftover import event_of, examine, flexible, lasti
 from hysteresis_ros.diagnosis.problem import sensor_resolution
 from hysteresis_ros.diagnosis.significance import (
     block_sums, cosines, family_p_values, flipped, gain_interval, held_out_errors,
-    paired_p_values, residualise)
+    paired_p_values, residualise, shifted)
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement
 
@@ -56,6 +56,18 @@ def test_flipped_residuals_keep_size_and_blocks():
     signs = draws / residual
     assert set(np.unique(signs)) == {-1.0, 1.0}
     assert np.all(signs.reshape(50, 4, 3) == signs.reshape(50, 4, 3)[:, :, :1])
+
+
+def test_shifted_residuals_keep_their_order_and_stand_elsewhere():
+    """A row follows the same one as before, but for its sign, and never stands in its place."""
+    residual, block = np.arange(1.0, 13.0), np.arange(12) // 3
+    draws = shifted(residual, block, np.random.default_rng(0), 50)
+    assert draws.shape == (50, 12)
+    sizes = np.abs(draws)
+    assert np.all(np.diff(sizes, axis=1) % 12.0 == 1.0)
+    assert np.all(sizes != residual) and len(np.unique(sizes[:, 0])) > 5
+    signs = np.sign(draws).reshape(50, 4, 3)
+    assert np.all(signs == signs[:, :, :1]) and set(np.unique(signs)) == {-1.0, 1.0}
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():

@@ -54,6 +54,17 @@ def test_a_gain_counts_only_against_the_best_of_the_family():
     assert alone < 0.05 < 0.5 < among
 
 
+def test_what_acts_in_four_blocks_only_is_no_chance():
+    """All four have the same random sign too often; but by chance they stand elsewhere."""
+    inside = np.isin(BLOCK, np.unique(BLOCK)[[2, 8, 13, 19]])
+    assert len(np.unique(FOLD[inside])) > 1
+    column = inside * np.linspace(1.0, 2.0, ROWS)
+    base, better = fit(0.0), fit(0.0, column[:, None])
+    base.held_out = MEASURED - 0.05 * column
+    value, = evidence(0.001).p_values([better], base)
+    assert value < 0.02
+
+
 def test_an_effect_has_to_help_enough_and_in_most_blocks():
     """Five per cent of the error, and not in one place only."""
     base = fit(1.0)

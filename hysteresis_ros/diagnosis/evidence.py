@@ -78,7 +78,8 @@ class Evidence:
         """
         Return family-wise p values of fits against the `current` one, shape (c,).
 
-        On an arm against two kinds of chance: decoys, and residuals with random signs by block.
+        On an arm against two kinds of chance: decoys, and residuals with random signs by block
+        or shifted in time; of these two the smaller p value counts, twice (Bonferroni).
 
         Parameters
         ----------
@@ -99,14 +100,16 @@ class Evidence:
             return significance.paired_p_values(blocks, self.rng)
         gains = np.array([np.mean(one) for one in squares])
         columns_of_all = [*(fit.jacobian for fit in fits), *family]
-        values = np.zeros(len(fits))
-        for draws in (self.decoys, significance.flipped(error, problem.block, self.rng)):
+
+        def against(draws):
             before = significance.held_out_errors(current.jacobian, draws, problem.fold)
-            chance = np.stack([
+            return significance.family_p_values(gains, np.stack([
                 before - significance.held_out_errors(columns, draws, problem.fold)
-                for columns in columns_of_all])
-            values = np.maximum(values, significance.family_p_values(gains, chance))
-        return values
+                for columns in columns_of_all]))
+
+        by_chance = np.minimum(*(against(draw(error, problem.block, self.rng))
+                                 for draw in (significance.flipped, significance.shifted)))
+        return np.maximum(against(self.decoys), np.minimum(2.0 * by_chance, 1.0))
 
     def helps(self, fit, current) -> bool:
         """Whether a fit explains enough to matter, in most blocks."""
