@@ -79,6 +79,12 @@ def creeping(drive):
     return total
 
 
+def ratcheting(drive):
+    """Return the muscle, less of it and further on after every stroke of the trial."""
+    strokes = 0.5 * np.cumsum(np.abs(np.diff(drive, prepend=drive[0])))
+    return muscle(drive) * (1.0 - 0.05 * np.log1p(strokes)) + 0.05 * np.log1p(strokes)
+
+
 def found_in(measurement, monkeypatch, names=('thermal_lag', 'fatigue', 'latency')):
     """Diagnose a table with the model of its own Preisach operator."""
     possible = search.possible
@@ -112,6 +118,15 @@ def test_creep_of_a_polymer_shows_and_is_plausible(monkeypatch):
     found = found_in(table(creeping), monkeypatch, ('creep', 'fatigue', 'latency'))
     assert found.missing == ['creep']
     assert found.effects[0].values['kept'] == 1.0
+    assert not found.effects[0].implausible()
+    assert found.rmse_after < 0.5 * found.rmse_before
+
+
+def test_ratcheting_shows_though_every_trial_begins_anew(monkeypatch):
+    """As when each was taken of another specimen."""
+    found = found_in(table(ratcheting), monkeypatch, ('thermal_lag', 'creep', 'fatigue'))
+    assert found.missing == ['fatigue']
+    assert found.effects[0].values['kept'] == 0.0
     assert not found.effects[0].implausible()
     assert found.rmse_after < 0.5 * found.rmse_before
 

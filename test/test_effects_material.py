@@ -126,6 +126,23 @@ def test_fatigue_drifts_and_shrinks_with_the_logarithm_of_the_cycles():
     np.testing.assert_allclose(factor, 1.0 - 0.1 * np.log([1.0, 2.0, 10.0]))
 
 
+def test_fatigue_of_another_specimen_begins_anew():
+    """Where nothing is kept, cycles count from the first row after a start, as in a trial."""
+    made = effect('fatigue', b=0.2, a=0.1, kept=0.0)
+    trial = inputs([1, 2, 3], [7.0, 8.0, 16.0])
+    offset, factor = made.drift(np.zeros(3), np.zeros(3), trial, WIRE)
+    np.testing.assert_allclose(offset, -0.002 * 0.27 * np.log([1.0, 2.0, 10.0]))
+    for _ in range(2):
+        made.start()
+        rows = [Inputs(*(float(column[n]) for column in trial)) for n in range(3)]
+        added = []
+        for row in rows:
+            added.append(made.advance(0.0, 0.0, row, WIRE))
+            made.restore(made.save())
+        np.testing.assert_allclose(np.transpose(added), [offset, factor])
+        trial = trial._replace(cycles=trial.cycles + 40.0)
+
+
 def logistic(x):
     return 1.0 / (1.0 + math.exp(-x))
 

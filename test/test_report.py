@@ -11,7 +11,7 @@ import pytest
 from hysteresis_ros.diagnosis.diagnose import Diagnosis
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.report import write_diagnosis, write_extension
-from hysteresis_ros.diagnosis.words import verdict_in_words
+from hysteresis_ros.diagnosis.words import parameters_in_words, verdict_in_words
 from hysteresis_ros.measurements import Measurement
 
 NASTY = '<script>alert(1)</script>&run.csv'
@@ -174,3 +174,10 @@ def test_the_words_say_what_was_found(verdict, changes, words):
     """Each verdict in a sentence that a person can act on."""
     text = verdict_in_words(diagnosis(verdict, **changes))
     assert all(word in text for word in words)
+
+
+def test_the_words_of_values_have_units_and_intervals_where_there_are_any():
+    values = {'b': {'value': 0.12345, 'low': 0.1, 'high': 0.15, 'unit': '% of l0'},
+              'kept': {'value': 1.0, 'low': 1.0, 'high': 1.0, 'unit': '1'}}
+    assert parameters_in_words(values) == 'b 0.123 (0.1 to 0.15) % of l0, kept 1'
+    assert parameters_in_words(values, intervals=False) == 'b 0.123 % of l0, kept 1'

@@ -51,7 +51,7 @@ def run(args):
 def to_text(found, response):
     """Return the diagnosis for a terminal."""
     from hysteresis_ros.diagnosis.compare import layout
-    from hysteresis_ros.diagnosis.words import verdict_in_words
+    from hysteresis_ros.diagnosis.words import parameters_in_words, verdict_in_words
 
     factor, unit = UNITS[response]
     lines = [verdict_in_words(found), '']
@@ -63,8 +63,7 @@ def to_text(found, response):
                  f'{100.0 * found.unexplained:.0f} %')
     rows = [['effect', f'RMSE after [{unit}]', 'gain', 'p', 'absorbed', 'parameters']]
     for row in found.ranking[:10]:
-        values = ', '.join(f'{name} {entry["value"]:.3g} {entry["unit"]}'
-                           for name, entry in row['parameters'].items())
+        values = parameters_in_words(row['parameters'], intervals=False)
         rows.append([row['effect'], f'{factor * row["rmse_after"]:.3g}',
                      f'{100.0 * row["gain"]:.0f} %', f'{row["p_value"]:.3f}',
                      f'{100.0 * row["absorbed"]:.0f} %',

@@ -53,13 +53,12 @@ def run(args):
 
 def to_text(extension, response):
     """Return the gain for a terminal."""
+    from hysteresis_ros.diagnosis.words import parameters_in_words
+
     factor, unit = UNITS[response]
     lines = []
     for effect in extension.added:
-        values = ', '.join(f'{name} {entry["value"]:.4g} {entry["unit"]} '
-                           f'({entry["low"]:.4g} to {entry["high"]:.4g})'
-                           for name, entry in effect.to_dict()['parameters'].items())
-        lines.append(f'+ {effect.id}: {values}')
+        lines.append(f'+ {effect.id}: {parameters_in_words(effect.to_dict()["parameters"])}')
     for name in extension.implausible:
         lines.append(f'! {name} is outside its physical range: it stands in for something else')
     for label, errors in (('fitted', extension.train), ('not fitted', extension.test)):

@@ -93,6 +93,7 @@ def with_effects(args, model, force, length):
 def report(model, found, added):
     """Return the rows of Table I and what the fits say, for a terminal."""
     from hysteresis_ros.diagnosis.compare import layout
+    from hysteresis_ros.diagnosis.words import parameters_in_words
 
     rows = [['Table I', 'mean, model', 'linear', 'std, model', 'linear', 'rows']]
     for name, letter in (('force', 'F'), ('length', 'L')):
@@ -110,8 +111,5 @@ def report(model, found, added):
             lines.append(f'{name}: {len(fit.weights)} weights, rank {fit.rank}, '
                          f'{len(fit.never_excited)} cells never excited, bias {fit.bias:.4g}')
     for effect in added:
-        values = ', '.join(f'{name} {entry["value"]:.4g} {entry["unit"]} '
-                           f'({entry["low"]:.4g} to {entry["high"]:.4g})'
-                           for name, entry in effect.to_dict()['parameters'].items())
-        lines.append(f'+ {effect.id}: {values}')
+        lines.append(f'+ {effect.id}: {parameters_in_words(effect.to_dict()["parameters"])}')
     return '\n'.join(lines)

@@ -14,7 +14,7 @@ from hysteresis_ros.diagnosis.drawing import new_figure, png
 from hysteresis_ros.diagnosis.plots import figures
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.where import number
-from hysteresis_ros.diagnosis.words import verdict_in_words
+from hysteresis_ros.diagnosis.words import parameters_in_words, verdict_in_words
 from hysteresis_ros.measurements.quantities import shown
 
 MOST_ROWS = 15
@@ -168,9 +168,7 @@ def _ranking_figure(found, scale, unit):
 def _ranking_table(found, scale, unit):
     rows = []
     for row in found.ranking[:MOST_ROWS]:
-        values = ', '.join(
-            f'{name} {entry["value"]:.3g} ({entry["low"]:.3g} to {entry["high"]:.3g}) '
-            f'{entry["unit"]}' for name, entry in row['parameters'].items())
+        values = parameters_in_words(row['parameters'])
         rows.append([row['effect'], number(scale * row['rmse_after']),
                      f'{100.0 * row["gain"]:.0f} %', f'{row["p_value"]:.3f}',
                      f'{100.0 * row["absorbed"]:.0f} %', 'yes' if row['plausible'] else 'no',

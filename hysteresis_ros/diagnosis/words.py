@@ -1,6 +1,8 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The verdict as sentences that a person can act on."""
+"""A verdict as sentences that a person can act on, and the values of effects."""
+
+from collections.abc import Mapping
 
 from hysteresis_ros.effects import catalogue
 
@@ -47,3 +49,28 @@ def verdict_in_words(found) -> str:
                 'missing.')
     return ("Adequate: no effect of the catalogue explains more than chance and the base model's "
             'own error.')
+
+
+def parameters_in_words(parameters: Mapping, intervals: bool = True) -> str:
+    """
+    Write parameters with their units.
+
+    Parameters
+    ----------
+    parameters : mapping of str to mapping
+        By name 'value', 'low', 'high' and 'unit', as `Effect.to_dict` gives them.
+    intervals : bool
+        Whether to write low and high, too; of what was not fitted they are the value itself.
+
+    Returns
+    -------
+    str
+    """
+    words = []
+    for name, entry in parameters.items():
+        text = f'{name} {entry["value"]:.3g}'
+        if intervals and entry['low'] != entry['high']:
+            text += f' ({entry["low"]:.3g} to {entry["high"]:.3g})'
+        # 1 is the unit of what has none.
+        words.append(text + (f' {entry["unit"]}' if entry['unit'] not in ('', '1') else ''))
+    return ', '.join(words)

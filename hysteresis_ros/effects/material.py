@@ -345,11 +345,29 @@ class Fatigue(MaterialEffect):
         Parameter('b', '% of l0', 'drift per factor e of the number of cycles', 0.0, 0.5, 0.0,
                   (0.05, -0.05), both_signs=True),
         Parameter('a', '1', 'loss of stroke per factor e of the number of cycles', 0.0, 0.3, 0.0,
-                  (0.03,)),)
+                  (0.03,)),
+        Parameter('kept', '1', '1: what earlier trials have worn stays; 0: every trial begins '
+                  'anew, as with another specimen or one that recovers', 0.0, 1.0, 1.0, (1.0, 0.0),
+                  choices=(1.0, 0.0), kinds=('bench',)))
+
+    memory = ('_begun',)
+
+    def start(self):
+        """Begin a trial."""
+        self._begun = None
+
+    def advance(self, drive, heat, inputs, surroundings):
+        """Return drift and stroke for the cycles counted since recording or trial began."""
+        if self._begun is None:
+            self._begun = 0.0 if self.kept else inputs.cycles
+        return self._worn(inputs.cycles - self._begun, surroundings)
 
     def drift(self, drive, heat, inputs, surroundings):
-        """Return drift and stroke for the cycles counted since the recording began."""
-        cycles = inputs.cycles
+        """Return the same for a whole trial at once."""
+        begun = 0.0 if self.kept else inputs.cycles[0]
+        return self._worn(inputs.cycles - begun, surroundings)
+
+    def _worn(self, cycles, surroundings):
         logarithm = np.log1p(cycles)
         offset = -self.b / 100.0 * surroundings.length * logarithm
         return offset, np.maximum(1.0 - self.a * logarithm, 0.1)
