@@ -3,6 +3,7 @@
 """Fits of effects to measured rows: their parameters, their starts, and what is held out."""
 
 import dataclasses
+from types import SimpleNamespace
 
 from hypothesis import given, strategies as st
 from model_support import bicep_model, effect_of, runs, STRENGTHS
@@ -219,3 +220,20 @@ def test_beside_others_a_fit_begins_from_usual_values_too(problem, monkeypatch, 
     assert len(begun) == count and begun[0] == [effect.values for effect in (*known, new)]
     if count > 1:
         assert begun[1] == [effect.values for effect in usual([*known, new], 'arm')]
+
+
+def test_of_starts_without_any_effect_one_is_tried(problem, monkeypatch):
+    """A stop is looked for where the response ends, though stops out of reach fit better."""
+    monkeypatch.setattr(problem, 'measured', problem.measured + 0.01)
+    fitter = Fitter(problem)
+    followed = []
+    monkeypatch.setattr(fitter, 'fit', lambda fixed, effects, **options: followed.append(
+        effects[-1].values) or SimpleNamespace(predicted=problem.measured))
+    starts = fitter.starts([], effect_of(problem.model, 'end_stop'))
+    highest, lowest = np.max(problem.measured), np.min(problem.measured)
+    assert [start.values['stop'] for start in starts[-2:]] == [highest, lowest]
+    out_of_reach = [start for start in starts if start.side * (
+        start.stop - (highest if start.side > 0 else lowest)) > 0.05]
+    near = starts[-2].with_values(stop=highest - 0.015)
+    fitter.begin([], [], [*out_of_reach, *out_of_reach, near])
+    assert len(followed) == 2 and near.values in followed

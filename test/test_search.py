@@ -187,6 +187,20 @@ def test_the_search_ends_where_what_is_left_could_not_matter(base, left, goes_on
     assert bool(search._leaves(fit(left))) == goes_on
 
 
+@pytest.mark.parametrize('left, names, pairs', [
+    (0.99, ('sag',), False), (1.01, ('sag',), True), (0.99, ('sag', 'rub'), True)])
+def test_pairs_are_not_tried_beside_one_effect_that_explains_nine_tenths(
+        monkeypatch, left, names, pairs):
+    """It does not stand in for two others; two that leave as little may."""
+    monkeypatch.setattr(Fit, 'implausible', lambda self: [])
+    search = searching(fit(10.0))
+    found = fit(left, names=names)
+    search._seeds = lambda: [SimpleNamespace(fit=found)]
+    search._grow = lambda seed: seed
+    search._pairs = lambda sets: ['a pair']
+    assert search._on_arm() == [found, *(['a pair'] if pairs else [])]
+
+
 @pytest.mark.parametrize('contained, first', [('wide', 'narrow'), ('other', 'wide')])
 def test_an_effect_gives_way_to_one_that_it_contains_while_the_rest_may_be_chance(contained, first):
     """Not to one that has nothing to do with it, which is clearly worse."""

@@ -264,7 +264,7 @@ def _changes(problem, effects, fitted, without):
     effect = present(problem.model, catalogue()[fitted.id])
     changes = []
     with np.errstate(all='ignore'):
-        for start in [*starts_of(effect, problem.kind), fitted]:
+        for start in [*starts_of(effect, problem.kind, problem.measured), fitted]:
             together = [*effects, start]
             change = problem.simulate(
                 [*beside(problem.model.effects, together), *together]) - without

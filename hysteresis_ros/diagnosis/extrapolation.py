@@ -70,8 +70,9 @@ class Extrapolation:
         if candidate.id not in self._changes:
             model = self._problem.model
             effect = present(model, catalogue()[candidate.id])
+            starts = starts_of(effect, self._problem.kind, self._problem.measured)
             changes = [self._problem.simulate([*beside(model.effects, [start]), start])
-                       - self._base.predicted for start in starts_of(effect, self._problem.kind)]
+                       - self._base.predicted for start in starts]
             columns = np.column_stack([candidate.signature, candidate.fit.jacobian, *changes])
             self._changes[candidate.id] = np.where(
                 np.all(np.isfinite(columns), axis=0), columns, 0.0)

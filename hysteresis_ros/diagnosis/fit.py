@@ -15,6 +15,8 @@ from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 FOLLOWED_STARTS = 2
 WORTH_FOLLOWING = 2.0
 FIRST_EVALUATIONS = 4
+# Decimals, in parts of the response's variance, to which errors of starts without effect agree.
+SAME = 9
 # By whether weights are fitted again for every one, which takes much longer.
 MOST_EVALUATIONS = {True: 8, False: 20}
 # What has not taken this share off the error by then is not followed any further.
@@ -154,7 +156,7 @@ class Fitter:
 
     def starts(self, fixed, effect) -> list:
         """Return an effect at the values from which a fit may start."""
-        starts = starts_of(effect, self.problem.kind)
+        starts = starts_of(effect, self.problem.kind, self.problem.measured)
         if len(beside(fixed, [effect])) < len(fixed):
             # What the bench says of it is as good a start as any.
             starts.append(effect)
@@ -175,7 +177,9 @@ class Fitter:
         """
         kept = [*beside(fixed, [*known, starts[0]]), *known]
         errors = [self.error(self.problem.simulate([*kept, start])) ** 2 for start in starts]
-        order = np.argsort(errors, kind='stable')
+        # Starts without any effect, such as stops out of reach, all have the same error.
+        spread = max(float(np.var(self.problem.measured)), 1e-300)
+        _, order = np.unique(np.round(np.array(errors) / spread, SAME), return_index=True)
         followed = [starts[index] for index in order[:1 if known else FOLLOWED_STARTS]
                     if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
         return min((self.fit(fixed, [*known, start], evaluations=FIRST_EVALUATIONS)

@@ -75,11 +75,12 @@ def _from_unit(parameter, value: float) -> float:
     return math.exp(value) if parameter.log else value * _unit(parameter)
 
 
-def starts_of(effect, kind: str, most: int = 14) -> list:
+def starts_of(effect, kind: str, measured=None, most: int = 14) -> list:
     """
     Return copies of `effect` at the values from which a fit may start.
 
-    All combinations of the starts of its parameters, thinned evenly to at most `most`.
+    All combinations of the starts of its parameters, thinned evenly to at most `most`, and what
+    the response, where it is given, suggests.
     """
     fitted = [parameter for parameter in effect.parameters if kind in parameter.kinds]
     combinations = list(itertools.product(
@@ -87,9 +88,11 @@ def starts_of(effect, kind: str, most: int = 14) -> list:
     if len(combinations) > most:
         chosen = np.linspace(0, len(combinations) - 1, most).round().astype(int)
         combinations = [combinations[index] for index in chosen]
-    return [effect.with_values(**{parameter.name: value
-                                  for parameter, value in zip(fitted, combination)})
-            for combination in combinations]
+    starts = [effect.with_values(**{parameter.name: value
+                                    for parameter, value in zip(fitted, combination)})
+              for combination in combinations]
+    guesses = [] if measured is None else effect.guesses(measured)
+    return starts + [starts[0].with_values(**guess) for guess in guesses]
 
 
 def usual(effects, kind: str) -> list:

@@ -245,6 +245,10 @@ class Effect(abc.ABC):
                    'high': self.intervals.get(name, (value, value))[1], 'unit': units[name]}
             for name, value in self.values.items()}}
 
+    def guesses(self, measured) -> list[dict]:
+        """Return values by name that the measured response (n,) suggests to start a fit from."""
+        return []
+
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:
         """Whether the effect makes sense for this muscle, whatever was recorded."""

@@ -132,7 +132,7 @@ class ClampMass(MechanismEffect):
     experiment = 'run the arm without a payload'
     confused_with = ('geometry_error',)
     parameters = (
-        Parameter('moment', 'g m', 'mass times distance m_c r_c', 0.1, 1.5, 0.0, (0.5,), log=True),
+        Parameter('moment', 'g m', 'mass times distance m_c r_c', 0.1, 2.5, 0.0, (0.5,), log=True),
         Parameter('phi', 'rad', 'direction of its centre against the forearm', 0.0, math.pi, 0.0,
                   (0.0, 1.5), both_signs=True),)
 
@@ -189,11 +189,16 @@ class EndStop(MechanismEffect):
     invertible = False
     parameters = (
         Parameter('stop', 'rad', 'angle of the stop', 0.0, math.pi, -1.0,
-                  (0.9, 1.1, 1.3, 1.5, 1.7, 1.9, 2.1)),
+                  (0.9, 1.2, 1.5, 1.8, 2.1)),
         Parameter('side', '1', '1: the arm cannot go above the stop, -1: not below it', -1.0, 1.0,
                   0.0, (1.0, -1.0), choices=(-1.0, 1.0)),
-        Parameter('stiffness', 'N m/rad', 'stiffness of the stop', 1.0, 100.0, 0.0, (5.0,),
+        Parameter('stiffness', 'N m/rad', 'stiffness of the stop', 1.0, 1000.0, 0.0, (5.0,),
                   log=True),)
+
+    def guesses(self, measured):
+        """Where the response ends there may be a stop."""
+        return [{'stop': float(np.max(measured)), 'side': 1.0},
+                {'stop': float(np.min(measured)), 'side': -1.0}]
 
     def forward(self, statics, geometry):
         """Let the stop carry the load beyond it."""
