@@ -187,14 +187,16 @@ def test_the_search_ends_where_what_is_left_could_not_matter(base, left, goes_on
     assert bool(search._leaves(fit(left))) == goes_on
 
 
-@pytest.mark.parametrize('left, names, pairs', [
-    (0.99, ('sag',), False), (1.01, ('sag',), True), (0.99, ('sag', 'rub'), True)])
+@pytest.mark.parametrize('left, names, settled, pairs', [
+    (0.99, ('sag',), False, False), (1.01, ('sag',), False, True),
+    (0.99, ('sag', 'rub'), False, True), (0.99, ('sag',), True, True)])
 def test_pairs_are_not_tried_beside_one_effect_that_explains_nine_tenths(
-        monkeypatch, left, names, pairs):
-    """It does not stand in for two others; two that leave as little may."""
+        monkeypatch, left, names, settled, pairs):
+    """In a continuous run it does not stand in for two others; two that leave as little may."""
     monkeypatch.setattr(Fit, 'implausible', lambda self: [])
     search = searching(fit(10.0))
     found = fit(left, names=names)
+    search.problem = SimpleNamespace(settled=settled)
     search._seeds = lambda: [SimpleNamespace(fit=found)]
     search._grow = lambda seed: seed
     search._pairs = lambda sets: ['a pair']

@@ -36,7 +36,8 @@ MOST_PAIRS = {True: 4, False: 2}
 # Only so many of the batches where a set leaves less than this many times as much as ends the
 # search: pairs have little more to explain.
 FEW_BATCHES, NEARLY = 1, 2.0
-# One effect that leaves no more of the error than this share does not stand in for two others.
+# One effect that leaves no more of a continuous run's error than this share hardly stands in for
+# two others, and pairs take long there. Settled rows show little more than a curve; there it may.
 HARDLY_TWO = 0.1
 # Sets that are begun for the alternatives to each effect of a set.
 RIVALS = 6
@@ -214,9 +215,9 @@ class Search:
             # Several effects may do what two others are the cause of.
             if any(len(fit.effects) == 1 and not self._leaves(fit) for fit in sets):
                 return sets
-        if not self._leaves(self.base) or any(
+        if not self._leaves(self.base) or (not self.problem.settled and any(
                 len(fit.effects) == 1 and self.error(fit) <= HARDLY_TWO * self.error(self.base)
-                for fit in sets):
+                for fit in sets)):
             return sets
         return sets + self._pairs(sets)
 
