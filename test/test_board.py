@@ -17,7 +17,7 @@ from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.bridge.simulated_board import SimulatedBoard, TICK
-from hysteresis_ros.errors import ParameterError, RangeError
+from hysteresis_ros.errors import BoardError, ParameterError, RangeError
 from hysteresis_ros.laboratory.plant import Plant
 import pytest
 
@@ -173,6 +173,20 @@ def test_speaks_over_the_network(boards):
         far.talks = False
         thread.join()
         assert 'is lost' in problem(board) or 'takes no bytes' in problem(board)
+
+
+def test_a_port_that_is_closed_meanwhile_is_lost():
+    """Another thread may close it between any two steps of a write or a read."""
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        link = BoardLink(f'socket://127.0.0.1:{server.getsockname()[1]}', 115200, QUICK)
+        link._make()
+        link._serial.open()
+        link._serial._socket.close()
+        link._serial._socket = None
+        with pytest.raises(BoardError, match='takes no bytes'):
+            link.send('hello')
+        with pytest.raises(BoardError, match='is lost'):
+            link.read()
 
 
 def test_first_word_on_the_way_out_is_zero():

@@ -21,6 +21,9 @@ if HANDLERS not in serial.protocol_handler_packages:
 READ_TIMEOUT = 0.05     # s; how late the reader notices that it is to stop
 LARGEST_READ = 4096
 LARGEST_GAP = 1000      # frames; a larger one is a board that started anew
+# What pyserial raises on a port that is gone; TypeError and AttributeError if it was closed by
+# another thread meanwhile.
+LOST = (OSError, TypeError, AttributeError)
 
 _HINTS = {
     errno.ENOENT: 'there is no such device; check the cable and the parameter port',
@@ -229,7 +232,7 @@ class BoardLink:
         """
         try:
             data = self._serial.read(min(max(self._serial.in_waiting, 1), LARGEST_READ))
-        except (OSError, TypeError) as error:   # TypeError: pyserial's port closed meanwhile
+        except LOST as error:
             raise BoardError(f'port {self.port} is lost: {error}') from None
         self._bytes += len(data)
         frames = [line for line in self.decoder.feed(data) if isinstance(line, Frame)]
@@ -279,5 +282,5 @@ class BoardLink:
             raise BoardError(f'port {self.port} is not open')
         try:
             self._serial.write(data)
-        except (OSError, TypeError) as error:
+        except LOST as error:
             raise BoardError(f'port {self.port} takes no bytes: {error}') from None
