@@ -68,6 +68,8 @@ def test_shifted_residuals_keep_their_order_and_stand_elsewhere():
     assert np.all(sizes != residual) and len(np.unique(sizes[:, 0])) > 5
     signs = np.sign(draws).reshape(50, 4, 3)
     assert np.all(signs == signs[:, :, :1]) and set(np.unique(signs)) == {-1.0, 1.0}
+    alone = shifted(np.ones(1), np.zeros(1, dtype=int), np.random.default_rng(0), 5)
+    assert np.all(np.abs(alone) == 1.0)
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():

@@ -58,9 +58,10 @@ def shifted(residual: np.ndarray, block: np.ndarray, rng, count: int = FLIPS) ->
     Every block has a random sign, too. What acts in a few blocks only, such as an end stop, cannot
     be told from chance by signs: of four blocks all have the same one in every eighth draw.
     """
-    least = len(residual) // (int(block.max()) + 1)
-    start = rng.integers(least, len(residual) - least + 1, size=count)
-    rows = (np.arange(len(residual)) + start[:, None]) % len(residual)
+    size = len(residual)
+    least = min(size // (int(block.max()) + 1), size // 2)
+    start = rng.integers(least, size - least + 1, size=count)
+    rows = (np.arange(size) + start[:, None]) % size
     return flipped(residual[rows], block, rng, count)
 
 
