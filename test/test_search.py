@@ -65,6 +65,14 @@ def test_what_acts_in_four_blocks_only_is_no_chance():
     assert value < 0.02
 
 
+def test_of_two_tests_of_chance_the_better_counts_twice():
+    """Nothing of 400 draws is as good, by sign or by place; decoys are too many to matter."""
+    made = evidence(1e-6)
+    made.decoys = np.tile(made.decoys, (10, 1))
+    value, = made.p_values([fit(0.0, CHANCE.standard_normal((ROWS, 1)))], fit(0.3))
+    assert value == pytest.approx(2.0 / 401.0)
+
+
 def test_an_effect_has_to_help_enough_and_in_most_blocks():
     """Five per cent of the error, and not in one place only."""
     base = fit(1.0)
