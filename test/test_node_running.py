@@ -21,7 +21,7 @@ from hysteresis_ros.nodes.running import run
 class Ending(Node):
     def __init__(self):
         super().__init__('ending')
-        self.create_timer(0.01, self.{method})
+        self.create_timer({period}, self.{method})
         print('up', flush=True)
 
     def wait(self):
@@ -46,11 +46,11 @@ sys.exit(run(Ending))
 """
 
 
-def begin(method):
+def begin(method, period=0.01):
     """Start the program and wait until its node is up."""
-    child = subprocess.Popen([sys.executable, '-c', PROGRAM.format(method=method)], text=True,
-                             stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                             start_new_session=True)
+    program = PROGRAM.format(method=method, period=period)
+    child = subprocess.Popen([sys.executable, '-c', program], text=True, stdout=subprocess.PIPE,
+                             stderr=subprocess.PIPE, start_new_session=True)
     assert child.stdout.readline() == 'up\n'
     return child
 
@@ -77,6 +77,16 @@ def test_what_has_begun_comes_to_its_end(domain_id, number):
     child.send_signal(number)
     output, errors = child.communicate(timeout=20)
     assert (child.returncode, output, errors) == (0, 'done\nzero\n', '')
+
+
+def test_a_node_that_waits_for_messages_ends_at_once(domain_id):
+    """Its executor sleeps inside DDS, and nothing else would wake it."""
+    child = begin('wait', period=1000.0)
+    with pytest.raises(subprocess.TimeoutExpired):
+        child.wait(0.5)
+    child.send_signal(signal.SIGTERM)
+    output, errors = child.communicate(timeout=20)
+    assert (child.returncode, output, errors) == (0, 'zero\n', '')
 
 
 def test_an_error_that_a_user_can_mend_is_one_line(domain_id):
