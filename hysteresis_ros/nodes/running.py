@@ -48,7 +48,8 @@ def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        ending.call(executor.wake)
+        # To be woken is not enough for an executor: it waits on until there is a callback to run.
+        ending.call(node.create_guard_condition(lambda: None).trigger)
         # What is there now stays for good: collections need not look at it between two messages.
         gc.freeze()
         while not ending.has_come:
