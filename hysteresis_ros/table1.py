@@ -19,7 +19,7 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.identification.baselines import (
     fit_additive, fit_embedded_line, fit_one_load, simulate)
 from hysteresis_ros.identification.bench import identify
-from hysteresis_ros.identification.effects import add_effects
+from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import Plant
 from hysteresis_ros.laboratory.protocols import LOADS, bench_tables

@@ -16,7 +16,7 @@ from hysteresis_ros.diagnosis.diagnose import Diagnosis, diagnose
 from hysteresis_ros.diagnosis.extend import extend, rmse
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
-from hysteresis_ros.identification.effects import add_effects
+from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.protocols import protocol_tables
 from hysteresis_ros.measurements import Measurement

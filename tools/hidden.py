@@ -59,7 +59,7 @@ def base_model(seed, material):
     """Identify the bench of the specimen, on which nothing is hidden."""
     from hysteresis_ros.bicep import BicepGeometry
     from hysteresis_ros.identification.bench import identify
-    from hysteresis_ros.identification.effects import add_effects
+    from hysteresis_ros.diagnosis.bench_effects import add_effects
     from hysteresis_ros.laboratory.linkage import GEOMETRY
     from hysteresis_ros.laboratory.protocols import protocol_tables
     from hysteresis_ros.measurements.table import Measurement

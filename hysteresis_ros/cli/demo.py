@@ -123,7 +123,7 @@ def bench_model(args, folder):
     """Identify the simulated bench and save the model."""
     from hysteresis_ros.bicep import BicepGeometry
     from hysteresis_ros.identification.bench import identify
-    from hysteresis_ros.identification.effects import add_effects
+    from hysteresis_ros.diagnosis.bench_effects import add_effects
     from hysteresis_ros.laboratory.protocols import write_protocol
     from hysteresis_ros.measurements import read_measurement
 

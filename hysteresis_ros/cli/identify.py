@@ -80,7 +80,7 @@ def table(path, responses):
 
 def with_effects(args, model, force, length):
     """Add effects to the bench model, fitted to the trials that are fitted."""
-    from hysteresis_ros.identification.effects import add_effects
+    from hysteresis_ros.diagnosis.bench_effects import add_effects
 
     if length is None:
         raise ParameterError('--effects needs a length table, in which effects of the load show')

@@ -9,7 +9,7 @@ Refitted weights would absorb most of what an effect does.
 import numpy as np
 
 from hysteresis_ros.diagnosis.problem import Problem
-from hysteresis_ros.diagnosis.structure import Offset
+from hysteresis_ros.diagnosis.discrepancy import Offset
 from hysteresis_ros.identification.operators import preisach_rows
 from hysteresis_ros.operators import Preisach
 
@@ -31,6 +31,23 @@ class ArmProblem(Problem):
             Not used: nothing but the effects' own parameters is fitted here.
         """
         return self.pick([simulator.run(effects) for simulator in self.simulators])
+
+    def simulate_many(self, sets) -> np.ndarray:
+        """
+        Return the simulated response of the judged rows for sets of effects.
+
+        Parameters
+        ----------
+        sets : sequence of list of Effect
+            All effects of the model, for each simulation.
+
+        Returns
+        -------
+        ndarray, shape (len(sets), n)
+        """
+        if not len(sets):
+            return np.zeros((0, len(self.measured)))
+        return np.stack([self.simulate(effects) for effects in sets])
 
     def completed(self, effects):
         """Return the model with these effects."""

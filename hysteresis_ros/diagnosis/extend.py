@@ -7,10 +7,12 @@ import hashlib
 
 import numpy as np
 
-from hysteresis_ros.diagnosis.candidates import may_differ, present
-from hysteresis_ros.diagnosis.fit import Fitter
-from hysteresis_ros.diagnosis.parameters import starts_of
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.observable import may_differ, present
+from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.selection import Selection
+from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import ParameterError
 
@@ -93,25 +95,21 @@ def extend(model, names, train, test=()) -> Extension:
     MeasurementError
         If the recordings do not fit together.
     """
-    problem = problem_for(model, train)
-    classes = _checked(problem, names)
-    fitter = Fitter(problem)
+    classes = _checked(problem_for(model, train), names)
+    replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
+    base = model.with_effects([e for e in model.effects if e.id not in replaced])
+    problem = problem_for(base, train)
     for kind in classes:
         if problem.kind not in kind.kinds:
             raise ParameterError(f'effect {kind.id} cannot be fitted to a {problem.kind} '
                                  'measurement; give an arm run')
-    replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
-    base = model.with_effects([e for e in model.effects if e.id not in replaced])
     judged = list(test) or list(train)
-    models, known = [('base', model)], []
-    for kind in classes:
-        known = [effect for effect in known if effect.id not in kind.replaces]
-        fit = _best(fitter, base.effects, known, present(model, kind))
-        known = fit.effects
-        models.append((f'+ {kind.id}', problem.completed([*base.effects, *known])))
-    fit = fitter.fit(base.effects, known, evaluations=EVALUATIONS)
-    added = fitter.with_intervals(fit)
-    extended = _stamped(problem.completed([*base.effects, *added]), added, train, problem.kind)
+    models, fits = [('base', model)], (
+        _on_bench if problem.refits else _on_arm)(problem, model, classes)
+    for kind, (effects, _) in zip(classes, fits):
+        models.append((f'+ {kind.id}', problem.completed([*base.effects, *effects])))
+    added, implausible = fits[-1]
+    extended = _stamped(models[-1][1], added, train, problem.kind)
     models[-1] = (models[-1][0], extended)
     steps = [(name, rmse(one, judged)) for name, one in models]
     # Where weights are refitted, the fair base is one that was refitted to the same rows.
@@ -122,7 +120,7 @@ def extend(model, names, train, test=()) -> Extension:
             return {}
         return {'rmse_before': rmse(before, recordings), 'rmse_after': rmse(extended, recordings)}
     return Extension(extended, added, both(list(train)), both(list(test)), steps,
-                     fit.implausible())
+                     implausible)
 
 
 def _checked(problem, names):
@@ -138,16 +136,31 @@ def _checked(problem, names):
     return [effect_class(name) for name in names]
 
 
-def _best(fitter, fixed, known, effect):
-    """Fit from the starts of the new effect and, on the bench, from usual values of all."""
-    fits = [fitter.search(fixed, known, effect)]
-    if fitter.problem.refits and known:
-        usual = []
-        for one in [*known, effect]:
-            starts = starts_of(one, fitter.problem.kind)
-            usual.append(starts[len(starts) // 2])
-        fits.append(fitter.fit(fixed, usual))
-    return min(fits, key=lambda fit: fitter.error(fit.predicted))
+def _on_bench(problem, model, classes) -> list:
+    """Fit effects one after the other, each with those before; the weights are refitted."""
+    fitter, known, found = BenchFitter(problem), [], []
+    for number, kind in enumerate(classes, 1):
+        known = [effect for effect in known if effect.id not in kind.replaces]
+        effect = present(model, kind)
+        fits = [fitter.search(known, effect)]
+        if known:
+            fits.append(fitter.fit(usual([*known, effect], problem.kind)))
+        fit = min(fits, key=lambda one: fitter.error(one.predicted))
+        if number == len(classes):
+            fit = fitter.fit(fit.effects, evaluations=EVALUATIONS)
+        known = fit.effects
+        found.append((fitter.with_intervals(fit), fit.implausible()))
+    return found
+
+
+def _on_arm(problem, model, classes) -> list:
+    """Fit effects one after the other, each with those before; the weights stay."""
+    selection = Selection(problem, Settings(), np.random.default_rng(0), lambda items, total: items)
+    fit, found = selection.base, []
+    for kind in classes:
+        fit = selection.add(fit, present(model, kind))
+        found.append((selection.fitter.with_intervals(fit), fit.implausible()))
+    return found
 
 
 def _stamped(model, added, train, kind):

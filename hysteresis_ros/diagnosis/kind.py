@@ -5,17 +5,29 @@
 from hysteresis_ros.diagnosis.arm_problem import ArmProblem
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.problem import Problem
+from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import MeasurementError
 
 
-def problem_for(model, measurements) -> Problem:
+def problem_for(model, measurements, effects=None, jobs: int = 1) -> Problem:
     """
     Return the problem that suits the kind of the measurements.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    measurements : sequence of Measurement
+    effects : sequence of str, optional
+        Effects to try; by default the whole catalogue.
+    jobs : int
+        Threads for the simulations; -1 for all cores.
 
     Raises
     ------
     MeasurementError
         If they are of kinds that cannot be judged together, or hold nothing to explain.
+    ParameterError
+        If an effect is unknown.
     """
     measurements = list(measurements)
     if not measurements:
@@ -29,6 +41,9 @@ def problem_for(model, measurements) -> Problem:
     if len(kinds) > 1:
         raise MeasurementError(f'the measurements are of several kinds ({", ".join(kinds)}); give '
                                'either bench tables or arm runs')
-    if measurements[0].kind == 'bench':
-        return BenchProblem(model, measurements)
-    return ArmProblem(model, measurements)
+    kind = BenchProblem if measurements[0].kind == 'bench' else ArmProblem
+    problem = kind(model, measurements)
+    problem.jobs = jobs
+    if effects is not None:
+        problem.catalogue = tuple(effect_class(name).id for name in effects)
+    return problem

@@ -41,6 +41,21 @@ class ParameterVector:
         return np.clip([_to_unit(parameter, self.effects[index].values[parameter.name])
                         for index, parameter in self.entries], self.lower, self.upper)
 
+    def prior(self) -> tuple[np.ndarray, np.ndarray]:
+        """
+        Return mean and standard deviation of the parameters beforehand, each shape (k,).
+
+        The plausible range is the middle 87 % (1.5 standard deviations to each side).
+        """
+        mean, spread = [], []
+        for _, parameter in self.entries:
+            low, high = (_to_unit(parameter, value) for value in (parameter.low, parameter.high))
+            if parameter.both_signs:
+                low = -high
+            mean.append(0.5 * (low + high))
+            spread.append(0.5 * (high - low) / 1.5)
+        return np.array(mean), np.array(spread)
+
     def with_vector(self, vector) -> list:
         """Return the effects with the values of a vector of shape (k,)."""
         values = [{} for _ in self.effects]

@@ -13,7 +13,7 @@ from hysteresis_ros.model.simulation import Simulator
 
 # A long recording is judged on about this many rows; between them nothing new is learned. Weights
 # that are refitted again and again ask for fewer.
-MOST_ROWS = {'arm': 800, 'bench': 400}
+MOST_ROWS = {'arm': 400, 'bench': 400}
 MOST_FOLDS = 4
 # Blocks for significance: about this many a recording.
 BLOCKS = 24
@@ -41,6 +41,11 @@ class Problem:
     signals : dict of str to ndarray, shape (n,)
         What was recorded or follows from it: drive, rate, time, since_step, cycles, ...
     """
+
+    # Effects to try; None for the whole catalogue.
+    catalogue: tuple | None = None
+    # Threads for the simulations; -1 for all cores.
+    jobs: int = 1
 
     def __init__(self, model, measurements):
         self.model = model

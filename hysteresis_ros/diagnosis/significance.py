@@ -1,87 +1,14 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether an effect explains more than the best of all effects would by chance.
+Whether sets of effects explain more of held-out rows than the best of them would by chance.
 
-All candidates are tested together (the family-wise error of the whole catalogue counts), on rows
-that were held out, and against two kinds of chance: residuals whose blocks have random signs, and
-decoys, errors that the base model is known to have.
+All sets are tested together, because the family-wise error of the whole catalogue counts.
 """
 
 import numpy as np
 
-FLIPS = 400
-RIDGE = 1e-9
-
-
-def held_out_errors(columns: np.ndarray, targets: np.ndarray, fold: np.ndarray) -> np.ndarray:
-    """
-    Mean squared held-out error of linear fits.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (n, k)
-        What is fitted; k may be 0.
-    targets : ndarray, shape (m, n)
-        Each row is fitted by itself.
-    fold : ndarray of int, shape (n,)
-        Rows of one fold are predicted from the others.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-    """
-    total = np.zeros(len(targets))
-    for number in np.unique(fold):
-        test = fold == number
-        error = targets[:, test]
-        if columns.shape[1]:
-            train = columns[~test]
-            gram = train.T @ train
-            gram += (RIDGE * np.trace(gram) + 1e-300) * np.eye(len(gram))
-            weights = np.linalg.solve(gram, train.T @ targets[:, ~test].T)
-            error = error - (columns[test] @ weights).T
-        total += np.sum(error ** 2, axis=1)
-    return total / targets.shape[1]
-
-
-def flipped(residual: np.ndarray, block: np.ndarray, rng, count: int = FLIPS) -> np.ndarray:
-    """Return copies (count, n) of residuals (n,) with a random sign for every block."""
-    signs = rng.choice((-1.0, 1.0), size=(count, int(block.max()) + 1))
-    return residual * signs[:, block]
-
-
-def shifted(residual: np.ndarray, block: np.ndarray, rng, count: int = FLIPS) -> np.ndarray:
-    """
-    Return copies (count, n) of a residual (n,), each shifted around by another number of rows.
-
-    Every block has a random sign, too. What acts in a few blocks only, such as an end stop, cannot
-    be told from chance by signs: of four blocks all have the same one in every eighth draw.
-    """
-    size = len(residual)
-    least = min(size // (int(block.max()) + 1), size // 2)
-    start = rng.integers(least, size - least + 1, size=count)
-    rows = (np.arange(size) + start[:, None]) % size
-    return flipped(residual[rows], block, rng, count)
-
-
-def family_p_values(gains: np.ndarray, chance: np.ndarray) -> np.ndarray:
-    """
-    Return p values that hold for the whole family.
-
-    Parameters
-    ----------
-    gains : ndarray, shape (c,)
-        Reduction of the mean squared error by each candidate.
-    chance : ndarray, shape (c, m)
-        The same in m draws in which there is nothing to find.
-
-    Returns
-    -------
-    ndarray, shape (c,)
-    """
-    best = np.max(chance, axis=0)
-    return (1.0 + np.sum(best[None, :] >= gains[:, None], axis=1)) / (1.0 + len(best))
+DRAWS = 400
 
 
 def block_sums(values: np.ndarray, block: np.ndarray) -> np.ndarray:
@@ -89,7 +16,7 @@ def block_sums(values: np.ndarray, block: np.ndarray) -> np.ndarray:
     return np.bincount(block, weights=values)
 
 
-def paired_p_values(gains: np.ndarray, rng, count: int = FLIPS) -> np.ndarray:
+def paired_p_values(gains: np.ndarray, rng, count: int = DRAWS) -> np.ndarray:
     """
     Family-wise p values from gains by block, by flipping the signs of whole blocks.
 
@@ -115,7 +42,7 @@ def paired_p_values(gains: np.ndarray, rng, count: int = FLIPS) -> np.ndarray:
 
 
 def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray, rng,
-                  level: float = 0.95, count: int = FLIPS) -> tuple[float, float]:
+                  level: float = 0.95, count: int = DRAWS) -> tuple[float, float]:
     """
     Interval of the relative reduction of the RMSE, by a bootstrap over blocks.
 

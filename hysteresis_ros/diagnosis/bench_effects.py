@@ -6,12 +6,12 @@ import dataclasses
 
 import numpy as np
 
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.diagnosis.evidence import PRACTICAL
 from hysteresis_ros.diagnosis.extend import extend
-from hysteresis_ros.diagnosis.fit import Fitter
-from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, measure
@@ -76,27 +76,24 @@ def _with_universal(model, found, fitted):
     and few rows may not prove either; but on an arm the load moves while the wire does. What is
     known beforehand needs no proof against chance, only held-out rows that do not speak against it.
     """
-    fitter = Fitter(problem_for(model, [fitted]))
+    fitter = BenchFitter(problem_for(model, [fitted]))
     names = [effect.id for effect in found]
-    rest = [_usual(kind(model.surroundings)) for name, kind in catalogue().items()
-            if kind.universal and name not in names and kind.available(model.surroundings)]
+    rest = usual([kind(model.surroundings) for name, kind in catalogue().items()
+                  if kind.universal and name not in names and kind.available(model.surroundings)],
+                 'bench')
     if not rest:
         return names
 
     def held_out(effects):
-        fit = fitter.fit(model.effects, effects)
+        fit = fitter.fit(effects)
         if fit.implausible():
             return np.inf
-        return fitter.error(fitter.cross_validate(model.effects, fit).held_out)
+        return fitter.error(fitter.cross_validate(fit).held_out)
 
     # Alone they have to help; beside one that was found they only must not harm.
-    limit = held_out(found) * ((1.0 + PRACTICAL) if names else (1.0 - PRACTICAL))
+    practical = Settings().practical
+    limit = held_out(found) * ((1.0 + practical) if names else (1.0 - practical))
     for more in (rest, *([effect] for effect in rest)):
         if held_out([*found, *more]) <= limit:
             return [*names, *(effect.id for effect in more)]
     return names
-
-
-def _usual(effect):
-    starts = starts_of(effect, 'bench')
-    return starts[len(starts) // 2]

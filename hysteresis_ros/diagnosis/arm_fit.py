@@ -1,0 +1,294 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Fit effects to runs of an arm: maximum a posteriori, in whitened residuals, many sets at once.
+
+Gauss-Newton steps with Levenberg's damping. All sets advance together, so that each step is one
+batch of simulations, whatever their number.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.covariance import Point
+from hysteresis_ros.diagnosis.observable import unaffected
+from hysteresis_ros.diagnosis.parameters import ParameterVector
+
+# Simulated responses are smooth only on this scale of the parameters' units.
+DIFFERENCE = 0.02
+MOST_STEPS = 12
+# Dampings that are tried at once, against the present one.
+DAMPINGS = (0.1, 1.0, 30.0)
+# A step that gains less than this in the log posterior ends the fit.
+LEAST_GAIN = 0.02
+# Longest step in the parameters' units, in which their range is about one.
+LONGEST = 1.0
+# The base model's own error bends an estimate by up to about this share.
+ESTIMATE_SLACK = 0.15
+
+
+@dataclasses.dataclass
+class Fit:
+    """
+    Effects fitted to the judged rows.
+
+    Attributes
+    ----------
+    effects : list of Effect
+        The fitted ones, with values.
+    vector : ndarray, shape (k,)
+        Their free parameters in the units of `ParameterVector`.
+    predicted : ndarray, shape (n,)
+        Response with them.
+    jacobian : ndarray, shape (n, k)
+        Derivatives of `predicted`.
+    log_evidence : float
+        Laplace's approximation; see `Fitter.judge`.
+    point : Point or None
+        Covariance of the residuals under which the evidence is largest.
+    spread : ndarray, shape (k, k)
+        Posterior covariance of `vector`.
+    held_out : ndarray, shape (n,), or None
+        Response of every row as predicted by a fit to the other folds.
+    """
+
+    effects: list
+    vector: np.ndarray
+    predicted: np.ndarray
+    jacobian: np.ndarray
+    log_evidence: float = -np.inf
+    point: Point | None = None
+    spread: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    held_out: np.ndarray | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Identifiers of the effects, sorted."""
+        return tuple(sorted(effect.id for effect in self.effects))
+
+    def implausible(self) -> list[str]:
+        """Names of parameters whose estimate is outside their physical range."""
+        return [f'{effect.id}.{name}' for effect in self.effects
+                for name in effect.implausible(ESTIMATE_SLACK)]
+
+
+class _Walk:
+    """One set of effects on its way to the maximum."""
+
+    def __init__(self, effects, kind):
+        self.parameters = ParameterVector(effects, kind)
+        self.mean, self.spread = self.parameters.prior()
+        inside = 1e-6 * (self.parameters.upper - self.parameters.lower)
+        self.vector = np.clip(self.parameters.vector(), self.parameters.lower + inside,
+                              self.parameters.upper - inside)
+        self.damping = 1e-2
+        self.predicted = self.jacobian = None
+        self.cost, self.active = np.inf, True
+
+    def penalty(self, vector):
+        return float(np.sum(((vector - self.mean) / self.spread) ** 2))
+
+    def moved(self):
+        """Return the vectors, each moved in one parameter, with the movements."""
+        upper, vectors, steps = self.parameters.upper, [], []
+        for index, value in enumerate(self.vector):
+            step = DIFFERENCE if value + DIFFERENCE < upper[index] else -DIFFERENCE
+            vectors.append(self.vector.copy())
+            vectors[-1][index] += step
+            steps.append(step)
+        return vectors, steps
+
+    def candidates(self, jacobian, residual):
+        """Return the vectors after steps of several dampings."""
+        matrix = jacobian.T @ jacobian + np.diag(self.spread ** -2.0)
+        slope = jacobian.T @ residual - (self.vector - self.mean) / self.spread ** 2
+        found = []
+        for damping in DAMPINGS:
+            damped = matrix + self.damping * damping * np.diag(np.diag(matrix))
+            step = np.clip(np.linalg.solve(damped, slope), -LONGEST, LONGEST)
+            found.append(np.clip(self.vector + step, self.parameters.lower,
+                                 self.parameters.upper))
+        return found
+
+
+class Fitter:
+    """
+    Fits sets of effects on one problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Runs of an arm.
+    covariance : Covariance
+        Of the residuals.
+    """
+
+    def __init__(self, problem, covariance):
+        self.problem = problem
+        self.covariance = covariance
+        self.fixed = list(problem.model.effects)
+        self.simulations = 0
+
+    def simulate(self, sets) -> np.ndarray:
+        """Return the responses (len(sets), n) with sets of effects beside the model's own."""
+        self.simulations += len(sets)
+        with np.errstate(all='ignore'):
+            return self.problem.simulate_many(
+                [[*unaffected(self.fixed, effects), *effects] for effects in sets])
+
+    def error(self, predicted) -> float:
+        """Return the root mean square error of a response."""
+        return float(np.sqrt(np.mean((self.problem.measured - predicted) ** 2)))
+
+    def fit(self, sets, point: Point, steps: int = MOST_STEPS) -> list[Fit]:
+        """
+        Fit sets of effects from their present values; those whose simulation fails are left out.
+
+        Parameters
+        ----------
+        sets : sequence of list of Effect
+        point : Point
+            Covariance of the residuals.
+        steps : int
+            Gauss-Newton steps at most.
+
+        Returns
+        -------
+        list of Fit
+        """
+        walks = [_Walk(effects, self.problem.kind) for effects in sets]
+        for walk, predicted in zip(walks, self._at(walks, [[w.vector] for w in walks])):
+            self._take(walk, walk.vector, predicted[0], point)
+            walk.active = bool(np.isfinite(walk.cost))
+        walks = [walk for walk in walks if walk.active]
+        for left in range(steps, -1, -1):
+            active = [walk for walk in walks if walk.active]
+            if not active:
+                break
+            self._differentiate(active)
+            active = [walk for walk in active if walk.active and len(walk.vector)]
+            if left == 0:
+                break
+            trials = [walk.candidates(point.whiten(walk.jacobian), point.whiten(
+                self.problem.measured - walk.predicted)) for walk in active]
+            for walk, vectors, responses in zip(active, trials, self._at(active, trials)):
+                before = walk.cost
+                for damping, vector, predicted in zip(DAMPINGS, vectors, responses):
+                    if self._take(walk, vector, predicted, point):
+                        chosen = damping
+                if before - walk.cost > 0.0:
+                    walk.damping = max(walk.damping * chosen, 1e-6)
+                else:
+                    walk.damping *= 30.0
+                walk.active = before - walk.cost > 2.0 * LEAST_GAIN or (
+                    walk.cost == before and walk.damping < 1.0)
+                walk.jacobian = walk.jacobian if walk.cost == before else None
+        self._differentiate([walk for walk in walks if walk.jacobian is None])
+        return [self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
+                               walk.predicted, walk.jacobian))
+                for walk in walks if np.all(np.isfinite(walk.jacobian))]
+
+    def _at(self, walks, vectors):
+        """Return for each walk the responses at its vectors."""
+        responses = iter(self.simulate([walk.parameters.with_vector(vector)
+                                        for walk, own in zip(walks, vectors) for vector in own]))
+        return [[next(responses) for _ in own] for own in vectors]
+
+    def _differentiate(self, walks):
+        walks = [walk for walk in walks if walk.jacobian is None]
+        moved = [walk.moved() for walk in walks]
+        responses = self._at(walks, [vectors for vectors, _ in moved])
+        for walk, (_, steps), own in zip(walks, moved, responses):
+            walk.jacobian = np.zeros((len(walk.predicted), len(steps)))
+            for index, (step, response) in enumerate(zip(steps, own)):
+                walk.jacobian[:, index] = (response - walk.predicted) / step
+            walk.active = walk.active and bool(np.all(np.isfinite(walk.jacobian)))
+
+    def _take(self, walk, vector, predicted, point) -> bool:
+        """Move a walk to a vector if that is better."""
+        if not np.all(np.isfinite(predicted)):
+            return False
+        whitened = point.whiten(self.problem.measured - predicted)
+        cost = float(whitened @ whitened) + walk.penalty(vector)
+        if cost >= walk.cost:
+            return False
+        walk.vector, walk.predicted, walk.cost = vector, predicted, cost
+        return True
+
+    def judge(self, fit: Fit) -> Fit:
+        """
+        Return a fit with its evidence, the largest over the covariances at hand.
+
+        Laplace: log p(y | set) = log p(y | x, K) + log p(x) + k/2 log 2 pi - 1/2 log |H|, with
+        H = J' K^-1 J + the prior's precision (MacKay, Information Theory, ch. 28).
+        """
+        mean, spread = ParameterVector(fit.effects, self.problem.kind).prior()
+        away = (fit.vector - mean) / spread
+        prior = -0.5 * float(away @ away) - float(np.sum(np.log(spread)))
+        best = dataclasses.replace(fit, log_evidence=-np.inf)
+        for point in self.covariance.points:
+            residual = point.whiten(self.problem.measured - fit.predicted)
+            jacobian = point.whiten(fit.jacobian) if len(fit.vector) else fit.jacobian
+            matrix = jacobian.T @ jacobian + np.diag(spread ** -2.0)
+            evidence = (point.constant - 0.5 * float(residual @ residual) + prior
+                        - 0.5 * float(np.linalg.slogdet(matrix)[1]))
+            if evidence > best.log_evidence:
+                best = dataclasses.replace(
+                    fit, log_evidence=evidence, point=point, spread=np.linalg.inv(matrix))
+        return best
+
+    def refined(self, fit: Fit) -> Fit:
+        """Fit the covariance to what a fit leaves, then the effects under it once more."""
+        values = self.covariance.fit(self.problem.measured - fit.predicted, fit.point.values)
+        point = self.covariance.add(values)
+        better = self.fit([fit.effects], point, steps=3) if len(fit.vector) else [fit]
+        return max([self.judge(one) for one in (fit, *better)], key=lambda one: one.log_evidence)
+
+    def with_intervals(self, fit: Fit, factor: float = 1.96) -> list:
+        """Return the fitted effects with 95 % intervals of their parameters."""
+        half = factor * np.sqrt(np.maximum(np.diag(fit.spread), 0.0))
+        return ParameterVector(fit.effects, self.problem.kind).with_intervals(fit.vector, half)
+
+    def cross_validate(self, fits) -> list[Fit]:
+        """
+        Return fits with the response of every row as predicted by a fit to the other folds.
+
+        One Gauss-Newton step from the fit to all rows, or a part of it, as the other folds say.
+        """
+        fits = list(fits)
+        folds = self.problem.folds
+        walks, vectors = [], []
+        for fit in fits:
+            walk = _Walk(fit.effects, self.problem.kind)
+            walk.vector = fit.vector
+            own = []
+            for fold in folds if len(fit.vector) else ():
+                step = self._step(fit, walk, self.problem.fold != fold)
+                own += [np.clip(fit.vector + part * step, walk.parameters.lower,
+                                walk.parameters.upper) for part in (1.0, 0.25)]
+            walks.append(walk)
+            vectors.append(own)
+        found = []
+        for fit, responses in zip(fits, self._at(walks, vectors)):
+            held_out = fit.predicted.copy()
+            for index, fold in enumerate(folds if len(fit.vector) else ()):
+                test = self.problem.fold == fold
+                error = [np.mean((self.problem.measured - one)[~test] ** 2) for one in
+                         (*responses[2 * index:2 * index + 2], fit.predicted)]
+                chosen = int(np.nanargmin(error))
+                one = (*responses[2 * index:2 * index + 2], fit.predicted)[chosen]
+                held_out[test] = one[test]
+            found.append(dataclasses.replace(fit, held_out=held_out))
+        return found
+
+    def _step(self, fit, walk, train):
+        """Return the Gauss-Newton step towards the rows to train on, shape (k,)."""
+        # Rows held out get no say; under the covariance of all rows that is a large noise.
+        jacobian, residual = (fit.jacobian[train],
+                              (self.problem.measured - fit.predicted)[train])
+        matrix = jacobian.T @ jacobian
+        variance = max(float(np.mean(residual ** 2)), 1e-300)
+        matrix = matrix / variance + np.diag(walk.spread ** -2.0)
+        slope = jacobian.T @ residual / variance - (fit.vector - walk.mean) / walk.spread ** 2
+        return np.clip(np.linalg.solve(matrix, slope), -LONGEST, LONGEST)

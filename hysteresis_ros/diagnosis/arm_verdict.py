@@ -1,0 +1,208 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The verdict on runs of an arm, from the posterior probabilities of the sets of effects.
+
+A set that leaves more than the base model's own error could be does not explain the recording,
+whatever its evidence: its probability is that of an unknown cause. So is the probability of
+something that happened once.
+"""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.diagnosis import events, significance, verdict
+from hysteresis_ros.diagnosis.observable import present
+from hysteresis_ros.diagnosis.residual import unexplained_signal
+from hysteresis_ros.diagnosis.selection import Selection
+from hysteresis_ros.effects import catalogue
+
+# A drive that moves over less than this share of its range excites nothing.
+LEAST_DRIVE = 0.05
+# An effect that changes less than this share of the largest error of its own is not excited.
+LEAST_CHANGE = 0.3
+# More than this share of the effects not excited: nothing is.
+MOST_UNOBSERVABLE = 0.8
+# An implausible set that leaves less than this share of the best one's residual resembles it.
+RESEMBLES = 0.6
+MOST_ALTERNATIVES = 3
+
+
+def arm_verdict(problem, settings, rng, progress) -> verdict.Diagnosis:
+    """
+    Diagnose runs of an arm.
+
+    Parameters
+    ----------
+    problem : ArmProblem
+    settings : Settings
+    rng : numpy.random.Generator
+    progress : callable
+    """
+    selection = Selection(problem, settings, rng, progress)
+    selection.run()
+    return _Verdict(selection).sum_up()
+
+
+class _Verdict:
+    """What follows from a selection."""
+
+    def __init__(self, selection):
+        self.selection = selection
+        self.problem, self.fitter = selection.problem, selection.fitter
+        self.settings = selection.settings
+
+    def sum_up(self) -> verdict.Diagnosis:
+        """Judge what is left, and put all together."""
+        selection, problem = self.selection, self.problem
+        valid = selection.valid()
+        event, event_log = events.most_probable(problem, selection)
+        shares = self._probabilities(valid, event_log)
+        unknown = shares.pop('unknown') > 0.5
+        chosen = frozenset() if unknown else max(shares, key=shares.get)
+        best = valid[0] if valid else frozenset()
+        unobservable = {**selection.unobservable, **self._too_weak()}
+        resembles = self._resembles(best) if unknown else []
+        kind = 'unknown' if unknown else self._known(chosen, unobservable)
+        alternatives = self._alternatives(chosen, valid)
+        fits = self.fitter.cross_validate([selection.base, selection.fits[chosen]])
+        before, after = (self.fitter.error(fit.held_out) for fit in fits)
+        effects = self._in_order(self.fitter.with_intervals(selection.fits[chosen]))
+        missing = [effect.id for effect in effects]
+        happened = event if unknown and event_log > self._log_mass(valid) else None
+        return verdict.Diagnosis(
+            verdict=kind, missing=missing,
+            alternatives=[alternatives[name] for name in missing],
+            ranking=self._ranking(missing, before), sets=self._sets(shares, unknown),
+            noise_floor=selection.fits[chosen].point.noise,
+            structural_error=selection.covariance.size,
+            unexplained=self._unexplained(chosen),
+            experiment=verdict.next_experiment(
+                kind, missing or resembles, [alternatives[name] for name in missing],
+                unobservable),
+            effects=effects, rmse_before=before, rmse_after=after, not_excited=unobservable,
+            event=happened, resembles=resembles,
+            signal=unexplained_signal(problem, problem.measured - selection.fits[
+                chosen].predicted) if unknown else '')
+
+    def _in_order(self, effects):
+        """Return effects, that first which explains most by itself."""
+        def alone(effect):
+            return self.selection.error(frozenset([effect.id]))
+        return sorted(effects, key=alone)
+
+    def _log_mass(self, valid) -> float:
+        temper = self.settings.temper
+        return max((self.selection.log_posterior(names) / temper for names in valid),
+                   default=-np.inf)
+
+    def _probabilities(self, valid, event_log) -> dict:
+        """Return the posterior probability of each set, and of 'unknown'."""
+        temper = self.settings.temper
+        weights = {names: self.selection.log_posterior(names) / temper for names in valid}
+        top = max([event_log, *weights.values()])
+        mass = {names: math.exp(value - top) for names, value in weights.items()}
+        unknown = math.exp(event_log - top)
+        known = {}
+        for names, value in mass.items():
+            if self.selection.sufficient(names):
+                known[names] = value
+            else:
+                unknown += value
+        total = unknown + sum(known.values())
+        return {**{names: value / total for names, value in known.items()},
+                'unknown': unknown / total}
+
+    def _sets(self, shares, unknown) -> list:
+        rows = [{'effects': sorted(names), 'probability': float(share),
+                 'rmse': self.selection.error(names)}
+                for names, share in shares.items() if share >= 1e-3]
+        rest = 1.0 - sum(row['probability'] for row in rows)
+        rows.append({'effects': ['unknown'], 'probability': float(max(rest, 0.0)),
+                     'rmse': self.selection.error(frozenset())})
+        return sorted(rows, key=lambda row: -row['probability'])
+
+    def _known(self, chosen, unobservable) -> str:
+        if chosen:
+            return 'missing'
+        names = self.selection.names
+        count = sum(name in unobservable for name in names)
+        drive = self.problem.signals.get('drive', np.zeros(1))
+        still = np.ptp(drive) < LEAST_DRIVE * self.problem.model.drive_range
+        if still or count > MOST_UNOBSERVABLE * max(len(names), 1):
+            return 'not_excited'
+        return 'adequate'
+
+    def _unexplained(self, chosen) -> float:
+        """Share of the first mean square that neither set nor base model nor noise explains."""
+        selection = self.selection
+        beyond = selection.structure(chosen) ** 2 - selection.limit ** 2
+        first = selection.error(frozenset()) ** 2
+        return float(np.clip(beyond / max(first, 1e-300), 0.0, 1.0))
+
+    def _alternatives(self, chosen, valid) -> dict:
+        """For each effect of the answer, name those that could as well be in its place."""
+        selection = self.selection
+        found: dict[str, list] = {name: [] for name in chosen}
+        if not chosen:
+            return found
+        for name in chosen:
+            selection.grow(chosen - {name})
+        best = selection.log_posterior(chosen) / self.settings.temper
+        least = best + math.log(self.settings.reported)
+        for names in selection.valid():
+            if (names == chosen or len(names) != len(chosen)
+                    or selection.log_posterior(names) / self.settings.temper < least
+                    or not selection.sufficient(names)):
+                continue
+            places, new = sorted(chosen - names), sorted(names - chosen)
+            for place, other in zip(places, new):
+                if all(other not in named for named in found.values()) and len(
+                        found[place]) < MOST_ALTERNATIVES:
+                    found[place].append(other)
+        return found
+
+    def _resembles(self, best) -> list:
+        """Name the effects of an implausible set that explains far more than the best one."""
+        selection = self.selection
+        sets = [names for names, fit in selection.fits.items()
+                if names and len(names) <= max(len(best), 1) and fit.implausible()]
+        names = min(sets, key=selection.error, default=None)
+        if names is None or selection.error(names) > RESEMBLES * selection.error(best):
+            return []
+        return sorted(names)
+
+    def _too_weak(self) -> dict:
+        """Effects that even at the upper end of their range would not stand out here."""
+        selection, kind = self.selection, self.problem.kind
+        strongest = []
+        for name in selection.names:
+            effect = present(self.problem.model, catalogue()[name])
+            strongest.append(effect.with_values(**{
+                parameter.name: (parameter.choices[-1] if parameter.choices else parameter.high)
+                for parameter in effect.parameters if kind in parameter.kinds}))
+        changes = self.fitter.simulate([[one] for one in strongest]) - selection.base.predicted
+        sizes = np.sqrt(np.mean(changes ** 2, axis=1))
+        return {name: 'even a strong one would change less than the noise'
+                for name, size in zip(selection.names, sizes)
+                if np.isfinite(size) and size < LEAST_CHANGE * selection.limit}
+
+    def _ranking(self, missing, before) -> list:
+        selection, problem = self.selection, self.problem
+        alone = [fit for names, fit in selection.fits.items() if len(names) == 1]
+        if not alone:
+            return []
+        rows = []
+        for fit in self.fitter.cross_validate(alone):
+            effect = self.fitter.with_intervals(fit)[0]
+            gain = significance.gain_interval(
+                problem.measured - selection.base.predicted, problem.measured - fit.held_out,
+                problem.block, selection.rng)
+            rows.append(verdict.ranking_row(
+                effect, fit, before, self.fitter.error(fit.held_out),
+                selection.p_values.get(effect.id, 1.0), gain))
+        verdict.add_signatures(
+            rows, np.stack([fit.predicted - selection.base.predicted for fit in alone]),
+            problem.weight_columns(selection.fixed))
+        return verdict.in_order(rows, missing)

@@ -1,0 +1,114 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The verdict on bench tables, from what sets of effects predict of held-out rows."""
+
+import numpy as np
+
+from hysteresis_ros.diagnosis import significance, verdict
+from hysteresis_ros.diagnosis.bench_selection import BenchSelection
+from hysteresis_ros.diagnosis.residual import shares, unexplained_signal
+
+# More than this share of the first mean square left over means that the cause is not known.
+UNEXPLAINED = 0.3
+# A structured error below this share of the response's range is that of any model.
+LEAST_STRUCTURE = 0.02
+# A held-out error above this share of the range: the model predicts nothing.
+LARGEST_ERROR = 0.15
+# An implausible set that leaves less than this share of the best one's residual resembles it.
+RESEMBLES = 0.6
+
+
+def bench_verdict(problem, settings, rng, jobs, progress) -> verdict.Diagnosis:
+    """
+    Diagnose bench tables.
+
+    Parameters
+    ----------
+    problem : BenchProblem
+    settings : Settings
+    rng : numpy.random.Generator
+    jobs : int
+        Processes.
+    progress : callable
+    """
+    selection = BenchSelection(problem, settings, rng, jobs, progress)
+    selection.run()
+    fitter, base, found = selection.fitter, selection.base, selection.found
+    before, after = selection.error(base), selection.error(found)
+    unexplained = _unexplained(selection)
+    resembles = _resembles(selection)
+    unknown = bool(resembles) or unexplained > UNEXPLAINED / max(len(found.effects), 1)
+    residual = problem.measured - found.predicted
+    if unknown:
+        # What explains a part of it stands in the ranking; the cause is none of these.
+        selection.found, after = base, before
+    alternatives = selection.alternatives()
+    effects = fitter.with_intervals(selection.found)
+    missing = [effect.id for effect in effects]
+    kind = ('unknown' if unknown else 'missing' if missing else
+            'not_excited' if not selection.alone and selection.unobservable else 'adequate')
+    named = [alternatives[name] for name in missing]
+    return verdict.Diagnosis(
+        verdict=kind, missing=missing, alternatives=named,
+        ranking=_ranking(selection, missing, rng), sets=_sets(selection, unknown),
+        noise_floor=problem.noise, structural_error=0.0,
+        unexplained=float(np.clip(unexplained, 0.0, 1.0)),
+        experiment=verdict.next_experiment(
+            kind, missing or resembles, named, selection.unobservable),
+        effects=effects, rmse_before=before, rmse_after=after,
+        not_excited=selection.unobservable, event=None,
+        signal=unexplained_signal(problem, residual) if unknown else '', resembles=resembles)
+
+
+def _unexplained(selection) -> float:
+    """Share of the first mean square that has structure, where that matters to a user."""
+    problem, found = selection.problem, selection.found
+    error = selection.fitter.error(found.predicted)
+    span = np.ptp(problem.measured)
+    if selection.error(found) > LARGEST_ERROR * span:
+        # It fits what it was given and says nothing of another trial: not such a muscle.
+        return 1.0
+    if error < LEAST_STRUCTURE * span:
+        return 0.0
+    # Weights that are refitted extrapolate badly, which is no structure: all rows are looked at.
+    explained = max(shares(problem, problem.measured - found.predicted).values())
+    return explained * (error / selection.fitter.error(selection.base.predicted)) ** 2
+
+
+def _resembles(selection) -> list:
+    """Name the effects of an implausible set that explains far more than what was found."""
+    found = selection.found
+    implausible = [fit for fit in selection.tried
+                   if fit.implausible() and len(fit.effects) <= max(len(found.effects), 1)]
+    best = min(implausible, key=selection.error, default=None)
+    if best is None or selection.error(found) <= selection.problem.noise or selection.error(
+            best) > RESEMBLES * selection.error(found):
+        return []
+    return sorted(best.names)
+
+
+def _sets(selection, unknown) -> list:
+    """Return the probabilities of sets; all of it is 'unknown' where the verdict is."""
+    rows = [{'effects': list(fit.names), 'probability': 0.0 if unknown else float(share),
+             'rmse': selection.error(fit)}
+            for fit, share in selection.probabilities() if share >= 1e-3]
+    rest = max(1.0 - sum(row['probability'] for row in rows), 0.0)
+    rows.append({'effects': ['unknown'], 'probability': float(rest),
+                 'rmse': selection.error(selection.base)})
+    return sorted(rows, key=lambda row: -row['probability'])
+
+
+def _ranking(selection, missing, rng) -> list:
+    problem, base, rows = selection.problem, selection.base, []
+    if not selection.alone:
+        return rows
+    for fit in selection.alone:
+        gain = significance.gain_interval(
+            problem.measured - base.held_out, problem.measured - fit.held_out, problem.block, rng)
+        rows.append(verdict.ranking_row(
+            selection.fitter.with_intervals(fit)[0], fit, selection.error(base),
+            selection.error(fit), selection.p_values[fit.names], gain))
+    verdict.add_signatures(
+        rows, np.stack([fit.predicted - base.predicted for fit in selection.alone]),
+        problem.weight_columns(selection.fitter.fixed))
+    return verdict.in_order(rows, missing)

@@ -1,0 +1,202 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Covariance of the residuals of a simulated response.
+
+    K = s^2 D + a^2 exp(-|dt| / tau) + w^2 I
+
+with D the discrepancy of the base model (`discrepancy`), a drift that is correlated in time within
+a trial, and white noise. s, a, tau and w are estimated from the residuals themselves by their
+marginal likelihood (Rasmussen and Williams, Gaussian Processes for Machine Learning, ch. 5), so
+that neither noise nor autocorrelation is taken for an effect. Their priors are weak: s lies near
+one, because the bench says how large the discrepancy is, a is of its size or less (half-Cauchy).
+"""
+
+import dataclasses
+
+import numpy as np
+from scipy import linalg, optimize
+
+# Bounds of the amplitudes against the discrepancy's size: as good as nothing, as good as all.
+WIDEST = 1e3
+# Spread (natural logarithm) of the correlation time about the middle of those that can be seen.
+TIME_SPREAD = 1.5
+# Largest scale of the discrepancy (natural logarithm).
+LARGEST_SCALE = 1.5
+EVALUATIONS = 25
+_TINY = 1e-300
+
+
+@dataclasses.dataclass
+class Point:
+    """
+    One covariance, factorised.
+
+    Attributes
+    ----------
+    values : ndarray, shape (4,)
+        Logarithms of s, a, tau [s] and w.
+    factor : ndarray, shape (n, n)
+        Lower Cholesky factor of K.
+    constant : float
+        Logarithm of the Gaussian density at no residual, with the prior of `values`.
+    """
+
+    values: np.ndarray
+    factor: np.ndarray
+    constant: float
+
+    def whiten(self, columns: np.ndarray) -> np.ndarray:
+        """Return columns (n,) or (n, k) in units in which the covariance is the identity."""
+        return linalg.solve_triangular(self.factor, columns, lower=True, check_finite=False)
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the white noise, in the unit of the response."""
+        return float(np.exp(self.values[3]))
+
+
+class Covariance:
+    """
+    Covariances of residuals on the rows of one problem.
+
+    Parameters
+    ----------
+    discrepancy : ndarray, shape (n, n)
+        D, in the squared unit of the response.
+    clock : ndarray, shape (n,)
+        Time of each row [s].
+    trial : ndarray of int, shape (n,)
+        Trial of each row; rows of different trials share the discrepancy only.
+    resolution : float
+        Standard deviation that the sensor's steps cause; the noise is at least this.
+    scale_spread : float
+        Spread (natural logarithm) of s.
+
+    Attributes
+    ----------
+    size : float
+        Root mean square of the discrepancy.
+    points : list of Point
+        Covariances at hand; see `add`.
+    """
+
+    def __init__(self, discrepancy, clock, trial, resolution: float, scale_spread: float):
+        self._discrepancy = discrepancy
+        self._same = trial[:, None] == trial[None, :]
+        self._gaps = np.where(self._same, np.abs(clock[:, None] - clock[None, :]), 0.0)
+        self._spread = scale_spread
+        self.size = float(np.sqrt(np.mean(np.diag(discrepancy))))
+        span = max(float(np.max(self._gaps)), _TINY)
+        steps = np.diff(clock)[np.diff(trial) == 0]
+        shortest = max(float(np.median(steps)), 1e-9 * span) if len(steps) else span
+        self.resolution = max(resolution, 1e-4 * self.size, _TINY)
+        self._scale = max(self.size, self.resolution)
+        self._middle = 0.5 * np.log(shortest * span)
+        self._low = np.array([-LARGEST_SCALE, np.log(self._scale / WIDEST),
+                              np.log(0.7 * shortest), np.log(self.resolution)])
+        self._high = np.array([LARGEST_SCALE, np.log(WIDEST * self._scale), np.log(3.0 * span),
+                               np.log(WIDEST * self._scale)])
+        self._high = np.maximum(self._high, self._low)
+        self.points: list[Point] = []
+
+    def start(self, drift: float = 0.1, noise: float = 0.0) -> np.ndarray:
+        """Return values (4,) with a drift and a noise given as shares of the discrepancy."""
+        return np.clip([0.0, np.log(drift * self._scale), self._middle,
+                        np.log(max(noise * self._scale, self.resolution))], self._low, self._high)
+
+    def _parts(self, values):
+        drift = np.where(self._same, np.exp(-self._gaps / np.exp(values[2])), 0.0)
+        drift *= np.exp(2.0 * values[1])
+        return np.exp(2.0 * values[0]) * self._discrepancy, drift, np.exp(2.0 * values[3])
+
+    def _prior(self, values):
+        """Return the log density of values (4,), and its gradient."""
+        ratio = np.exp(values[1]) / self._scale
+        white = np.exp(values[3]) / (3.0 * self.resolution + self._scale)
+        away = (values[2] - self._middle) / TIME_SPREAD
+        density = (-0.5 * (values[0] / self._spread) ** 2 - np.log1p(ratio ** 2) + np.log(ratio)
+                   - 0.5 * away ** 2 - np.log1p(white ** 2))
+        gradient = np.array([
+            -values[0] / self._spread ** 2, 1.0 - 2.0 * ratio ** 2 / (1.0 + ratio ** 2),
+            -away / TIME_SPREAD, -2.0 * white ** 2 / (1.0 + white ** 2)])
+        return float(density), gradient
+
+    def point(self, values: np.ndarray) -> Point:
+        """Return the covariance for values (4,)."""
+        discrepancy, drift, white = self._parts(values)
+        total = discrepancy + drift
+        total[np.diag_indices_from(total)] += white
+        factor = linalg.cholesky(total, lower=True, check_finite=False)
+        constant = (self._prior(values)[0] - float(np.sum(np.log(np.diag(factor))))
+                    - 0.5 * len(total) * np.log(2.0 * np.pi))
+        return Point(np.array(values), factor, constant)
+
+    def add(self, values: np.ndarray) -> Point:
+        """Return the covariance for values (4,) and keep it among the `points`."""
+        found = self.point(values)
+        self.points.append(found)
+        return found
+
+    def largest_error(self, rng, count: int, level: float = 0.95) -> float:
+        """
+        Return the root mean square error that the discrepancy stays below, at a probability.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+        count : int
+            Number of draws.
+        level : float
+            The probability.
+        """
+        values, vectors = linalg.eigh(self._discrepancy)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        draws = root @ rng.standard_normal((len(values), count))
+        scale = np.exp(self._spread * rng.standard_normal(count))
+        errors = scale * np.sqrt(np.mean(draws ** 2, axis=0))
+        return float(np.hypot(np.quantile(errors, level), self.resolution))
+
+    def fit(self, residual: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
+        """
+        Return the values (4,) of highest posterior density for a residual of shape (n,).
+
+        Parameters
+        ----------
+        residual : ndarray, shape (n,)
+            Measured less simulated.
+        values : ndarray, shape (4,), optional
+            Where to begin.
+        """
+        start = self.start() if values is None else np.clip(values, self._low, self._high)
+        with np.errstate(all='ignore'):
+            found = optimize.minimize(
+                self._cost, start, (residual,), jac=True, method='L-BFGS-B',
+                bounds=list(zip(self._low, self._high)), options={'maxfun': EVALUATIONS})
+        return found.x
+
+    def _cost(self, values, residual):
+        discrepancy, drift, white = self._parts(values)
+        total = discrepancy + drift
+        total[np.diag_indices_from(total)] += white
+        try:
+            factor = linalg.cho_factor(total, lower=True, check_finite=False)
+        except linalg.LinAlgError:
+            return 1e300, np.zeros(4)
+        solved = linalg.cho_solve(factor, residual, check_finite=False)
+        inverse = linalg.lapack.dpotri(factor[0], lower=1)[0]
+        diagonal = np.diag(inverse).copy()
+        # Only the lower triangle is there; what is summed is symmetric.
+        inverse = np.tril(inverse, -1)
+        prior, slope = self._prior(values)
+
+        def trace(part):
+            inside = 2.0 * np.sum(inverse * part) + diagonal @ np.diag(part)
+            return 0.5 * (inside - solved @ part @ solved)
+
+        gradient = np.array([
+            2.0 * trace(discrepancy), 2.0 * trace(drift),
+            trace(drift * self._gaps) / np.exp(values[2]),
+            white * (np.sum(diagonal) - solved @ solved)])
+        cost = (0.5 * residual @ solved + float(np.sum(np.log(np.diag(factor[0])))) - prior)
+        return float(cost), gradient - slope

@@ -1,0 +1,177 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Discrepancy of the base model: how wrong it is by itself, as a covariance of an arm's angles.
+
+Two parts are known before the arm moves. The bench says how large the error of the length is, on
+trials or loads that were held out; on the arm it shows as an error of the angle that is smooth in
+drive and response and differs between the directions of the drive. And the bench holds the load
+still, while an arm's load moves with the wire: what a load does in the middle of a transformation
+the bench cannot tell. Two models that agree on every bench table bound it: the load acts inside
+the operator and leaves its mark in the memory, or the muscle is at each moment as if its present
+load had acted all along. Their difference is the second part (`path_difference`).
+"""
+
+import numpy as np
+
+from hysteresis_ros.effects import MaterialEffect, Parameter, Statics
+from hysteresis_ros.model.chain import Chain
+
+# The error that differs between the directions of the drive, against the common one.
+DIRECTIONAL = 0.5
+# Constant loads between which the response is interpolated, and angles of the balance.
+LOADS, ANGLES = 12, 400
+
+
+class Offset(MaterialEffect):
+    """A constant added to the elongation, to see what an error of the length does to the angle."""
+
+    id = 'offset'
+    parameters = (Parameter('size', 'm', 'what is added', 0.0, 1.0, 0.0, ()),)
+
+    def drift(self, drive, heat, inputs, surroundings):
+        """Return the offset."""
+        return np.full(len(drive), self.size), np.ones(len(drive))
+
+
+def length_error(model) -> float:
+    """
+    Return the root mean square error of the length [m] that the bench has shown.
+
+    The largest of that on trials that were not fitted, that on loads left out of the fit, and,
+    where neither is known, that on the trials fitted.
+    """
+    metrics = model.metrics.get('length', {})
+    errors = [metrics.get(part, {}).get('rmse') for part in ('verification', 'left_out')]
+    known = [float(error) for error in errors if error is not None and np.isfinite(error)]
+    if known:
+        return max(known)
+    error = metrics.get('identification', {}).get('rmse')
+    return float(error) if error is not None and np.isfinite(error) else 0.0
+
+
+def sensitivity(problem, effects) -> np.ndarray:
+    """Return how the angle follows an error of the length [rad/m], shape (n,)."""
+    step = 0.01 * problem.model.surroundings.span
+    up, down = problem.simulate_many(
+        [[*effects, Offset(size=step)], [*effects, Offset(size=-step)]])
+    return (up - down) / (2.0 * step)
+
+
+def covariance(problem, gain, predicted, path, settings) -> np.ndarray:
+    """
+    Return the covariance of the base model's own error of the angle.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and model.
+    gain : ndarray, shape (n,)
+        See `sensitivity`.
+    predicted : ndarray, shape (n,)
+        Response of the base model.
+    path : ndarray, shape (n,)
+        See `path_difference`.
+    settings : Settings
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        In the squared unit of the response.
+    """
+    near = _smooth(problem, predicted, settings.correlation)
+    direction = np.ones(len(predicted))
+    if 'direction' in problem.signals:
+        direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
+    bench = 1.0 + DIRECTIONAL ** 2 * np.outer(direction, direction)
+    bench *= np.outer(gain, gain) * (
+        length_error(problem.model) ** 2 / (1.0 + DIRECTIONAL ** 2))
+    return near * (bench + np.outer(path, path))
+
+
+def _smooth(problem, predicted, length: float) -> np.ndarray:
+    """Return the correlation (n, n) of what is smooth in drive and response over a `length`."""
+    drive = problem.signals.get('drive', np.zeros(len(predicted)))
+    places = np.column_stack([_unit(drive), _unit(predicted)]) / length
+    squares = np.sum(places ** 2, axis=1)
+    gaps = squares[:, None] + squares[None, :] - 2.0 * places @ places.T
+    return np.exp(-0.5 * np.maximum(gaps, 0.0))
+
+
+def path_difference(problem, effects) -> np.ndarray:
+    """
+    Return what the angle would differ if the present load had acted all along, shape (n,).
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and model, of an arm.
+    effects : sequence of Effect
+        Effects of the model.
+    """
+    model = problem.model
+    chain = Chain([effect for effect in effects if effect.stage != 'sensor'], model.surroundings)
+    first, stage = model.first_stage(chain), model.require_length_stage()
+    if not first.loaded:
+        return np.zeros(len(problem.measured))
+    theta = np.linspace(*model.require_geometry().angle_range, ANGLES)
+    load, demand = _statics(chain, model.geometry, theta, stage.output_range[0])
+    columns = []
+    for simulator in problem.simulators:
+        angle = simulator.run(effects)
+        ends = np.interp([np.min(angle), np.max(angle)], theta, load)
+        loads = np.linspace(np.min(ends), np.max(ends) + 1e-9 * (1.0 + np.ptp(load)), LOADS)
+        column = np.empty(len(angle))
+        for trial in simulator.trials:
+            heat = chain.heat(trial.drive, trial.inputs)
+            first.reset()
+            x = first.simulate(np.concatenate(([chain.to_heat(model.cold_drive)], heat)))
+            outputs = np.stack([_held(stage, model.sign * (x - one)) for one in loads])
+            moving, still = (_balance(theta, load, demand, loads, given) for given in (
+                _along(stage, model.sign, x, angle[trial.rows], theta, load), outputs))
+            column[trial.rows] = still - moving
+        columns.append(column)
+    return problem.pick(columns)
+
+
+def _statics(chain, geometry, theta, base):
+    """Return the load that H2 feels, and what it has to give above `base`, at each angle."""
+    statics = Statics.of(geometry, theta)
+    for effect in chain.mechanism:
+        statics = effect.forward(statics, geometry)
+    force = np.maximum(statics.moment, 0.0) / (
+        geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6))
+    demand = (statics.length - base - chain.stretch(force)) / (chain.scale(force) + 0.0 * force)
+    return chain.load_inside(force) + 0.0 * force, np.maximum.accumulate(demand)
+
+
+def _held(stage, inputs):
+    """Return H2's output above its least (rows,) for inputs (rows + 1,), the cold one first."""
+    stage.reset()
+    stage.step(float(inputs[0]))
+    return stage.simulate(inputs[1:]) - stage.output_range[0]
+
+
+def _along(stage, sign, x, angle, theta, load):
+    """Return the same with the load of the arm's angle in each row, shape (1, rows)."""
+    felt = np.interp(angle, theta, load)
+    return _held(stage, sign * (x - np.concatenate((felt[:1], felt))))[None, :]
+
+
+def _balance(theta, load, demand, loads, outputs):
+    """Return the angle (rows,) at which outputs (loads, rows) give what the arm demands."""
+    if len(outputs) > 1:
+        place = np.clip((load - loads[0]) / (loads[1] - loads[0]), 0.0, len(loads) - 1.001)
+        below = place.astype(int)
+        part = (place - below)[:, None]
+        outputs = (1.0 - part) * outputs[below] + part * outputs[below + 1]
+    lacking = outputs - demand[:, None]
+    above = np.clip(np.argmax(lacking < 0.0, axis=0), 1, len(theta) - 1)
+    column = np.arange(lacking.shape[1])
+    before, after = lacking[above - 1, column], lacking[above, column]
+    share = np.clip(before / np.where(before == after, 1.0, before - after), 0.0, 1.0)
+    return theta[above - 1] + share * (theta[above] - theta[above - 1])
+
+
+def _unit(values):
+    return (values - values.min()) / max(np.ptp(values), 1e-12)

@@ -1,0 +1,57 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Something that happened once and lasts: a step of the response at an unknown moment."""
+
+import math
+
+import numpy as np
+
+# On each side of the moment at least this share of the rows is needed.
+MARGIN = 0.06
+
+
+def most_probable(problem, selection) -> tuple[float | None, float]:
+    """
+    Return when something may have happened, and how probable that is beside the sets of effects.
+
+    A step of unknown size in the response, or in the muscle's length, is one more column of the
+    response; its size has a Gaussian prior of the size of the residual, and each moment the same
+    probability.
+
+    Parameters
+    ----------
+    problem : Problem
+    selection : Selection
+
+    Returns
+    -------
+    time : float or None
+        Seconds since the first recording began; None for a recording that is too short.
+    log_posterior : float
+        On the scale of `Selection.log_posterior`, over the settings' `temper`.
+    """
+    count = len(problem.measured)
+    margin = max(2, int(MARGIN * count))
+    if count < 4 * margin:
+        return None, -np.inf
+    residual = problem.measured - selection.base.predicted
+    rows = np.arange(margin, count - margin)
+    steps = (np.arange(count)[:, None] >= rows[None, :]).astype(float)
+    shapes = [np.ones(count), selection.gain / max(float(np.sqrt(np.mean(
+        selection.gain ** 2))), 1e-300)]
+    prior = max(float(np.mean(residual ** 2)), 1e-300)
+    best, moment = -np.inf, rows[0]
+    for point in selection.covariance.points:
+        whitened = point.whiten(residual)
+        base = point.constant - 0.5 * float(whitened @ whitened)
+        for shape in shapes:
+            columns = point.whiten(steps * shape[:, None])
+            precision = np.sum(columns ** 2, axis=0) + 1.0 / prior
+            slope = columns.T @ whitened
+            evidence = base + 0.5 * slope ** 2 / precision - 0.5 * np.log(precision * prior)
+            index = int(np.argmax(evidence))
+            if evidence[index] > best:
+                best, moment = float(evidence[index]), rows[index]
+    odds = math.log(selection.settings.prior / (1.0 - selection.settings.prior))
+    total = best + odds - math.log(len(rows) * len(shapes))
+    return float(problem.clock[moment]), total / selection.settings.temper

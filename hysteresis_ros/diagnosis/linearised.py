@@ -1,0 +1,258 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Evidence of sets of effects in closed form, from responses that are linearised at every start.
+
+About a start the response is f + J (x - x0), and the prior of x is Gaussian, so that the evidence
+of an effect, and of two whose responses add up, is a small linear algebra problem under each
+covariance at hand (MacKay, Information Theory, ch. 28). It says which sets are worth a full fit.
+"""
+
+import dataclasses
+import itertools
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.observable import present
+from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.effects import catalogue
+
+# Starts of an effect from which pairs are made.
+PAIRED_STARTS = 3
+
+
+@dataclasses.dataclass
+class Start:
+    """
+    One effect at one start.
+
+    Attributes
+    ----------
+    effect : Effect
+        With the values of the start.
+    change : ndarray, shape (n,)
+        What the effect changes in the response if its parameters are at their prior mean, as the
+        linearisation says.
+    columns : ndarray, shape (n, k)
+        Derivatives in units of the prior's standard deviation.
+    """
+
+    effect: object
+    change: np.ndarray
+    columns: np.ndarray
+
+    @property
+    def id(self) -> str:
+        """The effect's identifier."""
+        return self.effect.id
+
+
+def starts_beside(fitter, fit, names) -> list[Start]:
+    """
+    Linearise effects at all their starts, with the effects of a fit in place.
+
+    Parameters
+    ----------
+    fitter : Fitter
+    fit : Fit
+        Its effects keep their values.
+    names : sequence of str
+        Effects to linearise.
+
+    Returns
+    -------
+    list of Start
+        Those whose simulation is finite.
+    """
+    problem, found = fitter.problem, []
+    own = {effect.id: effect for effect in fitter.fixed}
+    starts = []
+    for name in names:
+        effect = present(problem.model, catalogue()[name])
+        starts += starts_of(effect, problem.kind, problem.measured)
+        if name in own:
+            # What the bench says of it is as good a start as any.
+            starts.append(own[name])
+    walks = [_Moves(start, fit.effects, problem.kind) for start in starts]
+    responses = iter(fitter.simulate([effects for walk in walks for effects in walk.sets]))
+    for walk in walks:
+        own = np.stack([next(responses) for _ in walk.sets])
+        if not np.all(np.isfinite(own)):
+            continue
+        jacobian = (own[1:] - own[0]).T / np.array(walk.steps)
+        mean, spread = walk.parameters.prior()
+        found.append(Start(walk.start, own[0] - fit.predicted + jacobian @ (mean - walk.vector),
+                           jacobian * spread))
+    return found
+
+
+class _Moves:
+    """The sets to simulate for the derivatives of one effect at a start."""
+
+    def __init__(self, start, others, kind):
+        others = [effect for effect in others if effect.id not in start.replaces]
+        self.start = start
+        self.parameters = ParameterVector([start], kind)
+        self.vector = self.parameters.vector()
+        self.sets, self.steps = [[*others, start]], []
+        for index, value in enumerate(self.vector):
+            step = 0.02 if value + 0.02 < self.parameters.upper[index] else -0.02
+            moved = self.vector.copy()
+            moved[index] += step
+            self.sets.append([*others, *self.parameters.with_vector(moved)])
+            self.steps.append(step)
+
+
+class Linearised:
+    """
+    Evidences of single effects and pairs beside a fit.
+
+    Parameters
+    ----------
+    covariance : Covariance
+        Its `points` are tried.
+    residual : ndarray, shape (n,)
+        What the fit leaves.
+    starts : list of Start
+    nuisance : ndarray, shape (n, m)
+        Derivatives by the parameters of the fit, in units of their prior's spread; they are
+        estimated anew with whatever is added.
+    """
+
+    def __init__(self, covariance, residual, starts, nuisance=None):
+        self.starts = starts
+        count = len(residual)
+        nuisance = np.zeros((count, 0)) if nuisance is None else nuisance
+        self._fixed = nuisance.shape[1]
+        self._width = max([start.columns.shape[1] for start in starts], default=0)
+        blocks = [np.pad(start.columns, ((0, 0), (0, self._width - start.columns.shape[1])))
+                  for start in starts]
+        self._columns = np.column_stack([
+            residual, *(start.change for start in starts), nuisance, *blocks])
+        self._points = covariance.points
+        self._grams = []
+        for point in self._points:
+            whitened = point.whiten(self._columns)
+            self._grams.append(whitened.T @ whitened)
+
+    def _places(self, chosen):
+        """Return the columns' places of `chosen` (m, s) starts: derivatives (m, k), changes."""
+        chosen = np.asarray(chosen)
+        first = 1 + len(self.starts)
+        derivatives = (first + self._fixed + chosen[:, :, None] * self._width
+                       + np.arange(self._width)).reshape(len(chosen), -1)
+        fixed = np.broadcast_to(first + np.arange(self._fixed), (len(chosen), self._fixed))
+        changes = np.concatenate([np.zeros((len(chosen), 1), dtype=int), 1 + chosen], axis=1)
+        return np.concatenate([fixed, derivatives], axis=1), changes
+
+    def evidences(self, chosen) -> np.ndarray:
+        """
+        Return the log evidences of sets of starts, the largest over the covariances.
+
+        Parameters
+        ----------
+        chosen : sequence of sequence of int, shape (m, s)
+            Indices of the starts of each set, all sets of one size.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+        """
+        if not len(chosen):
+            return np.zeros(0)
+        derivatives, changes = self._places(chosen)
+        sign = np.concatenate([[1.0], -np.ones(changes.shape[1] - 1)])
+        best = np.full(len(derivatives), -np.inf)
+        for point, gram in zip(self._points, self._grams):
+            squares = np.einsum('i,mij,j->m', sign,
+                                gram[changes[:, :, None], changes[:, None, :]], sign)
+            evidence = point.constant - 0.5 * squares
+            if derivatives.shape[1]:
+                matrix = (gram[derivatives[:, :, None], derivatives[:, None, :]]
+                          + np.eye(derivatives.shape[1]))
+                slope = gram[derivatives[:, :, None], changes[:, None, :]] @ sign
+                factor = np.linalg.cholesky(matrix)
+                solved = np.linalg.solve(factor, slope[:, :, None])[:, :, 0]
+                evidence = (evidence + 0.5 * np.sum(solved ** 2, axis=1) - np.sum(
+                    np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1))
+            best = np.maximum(best, evidence)
+        return best
+
+    def singles(self) -> dict[tuple, tuple[float, list]]:
+        """Return for each effect the best evidence and the start that reaches it."""
+        values = self.evidences(np.arange(len(self.starts))[:, None])
+        found: dict[tuple, tuple[float, list]] = {}
+        for start, value in zip(self.starts, values):
+            if (start.id,) not in found or value > found[start.id,][0]:
+                found[start.id,] = (float(value), [start.effect])
+        return found
+
+    def pairs(self) -> dict[tuple, tuple[float, list]]:
+        """Return the same for pairs of effects, from the best few starts of each."""
+        alone = self.evidences(np.arange(len(self.starts))[:, None])
+        kept: dict[str, list] = {}
+        for index in np.argsort(-alone, kind='stable'):
+            own = kept.setdefault(self.starts[index].id, [])
+            if len(own) < PAIRED_STARTS:
+                own.append(int(index))
+        chosen = []
+        for one, other in itertools.combinations(kept, 2):
+            first, second = (self.starts[kept[name][0]].effect for name in (one, other))
+            if other not in first.replaces and one not in second.replaces:
+                chosen += itertools.product(kept[one], kept[other])
+        found: dict[tuple, tuple[float, list]] = {}
+        for (one, other), value in zip(chosen, self.evidences(np.array(chosen).reshape(-1, 2))):
+            effects = [self.starts[index].effect for index in (one, other)]
+            names = tuple(sorted(effect.id for effect in effects))
+            if names not in found or value > found[names][0]:
+                found[names] = (float(value), effects)
+        return found
+
+    def p_values(self, point, rng, count: int) -> dict[str, float]:
+        """
+        Return family-wise p values of single effects.
+
+        How often does the best of all effects gain as much in residuals that are drawn from the
+        covariance `point`, with its parameters estimated anew?
+
+        Parameters
+        ----------
+        point : Point
+            Covariance of the residuals where there is no effect.
+        rng : numpy.random.Generator
+        count : int
+            Number of draws.
+
+        Returns
+        -------
+        dict of str to float
+            (1 + draws as good) / (1 + draws), so that 1 / (1 + count) is the smallest.
+        """
+        draws = point.factor @ rng.standard_normal((len(point.factor), count))
+        alone = np.arange(len(self.starts))[:, None]
+        derivatives, _ = self._places(alone)
+        chance = np.full((len(self.starts), count), -np.inf)
+        base = np.full(count, -np.inf)
+        for other, gram in zip(self._points, self._grams):
+            drawn = other.whiten(draws)
+            columns = other.whiten(self._columns)
+            cross = columns.T @ drawn
+            change = np.arange(1, 1 + len(self.starts))
+            squares = (np.sum(drawn ** 2, axis=0)[None, :] - 2.0 * cross[change]
+                       + gram[change, change][:, None])
+            evidence = other.constant - 0.5 * squares
+            if derivatives.shape[1]:
+                matrix = (gram[derivatives[:, :, None], derivatives[:, None, :]]
+                          + np.eye(derivatives.shape[1]))
+                slope = cross[derivatives] - gram[derivatives, change[:, None]][:, :, None]
+                factor = np.linalg.cholesky(matrix)
+                solved = np.linalg.solve(factor, slope)
+                evidence = (evidence + 0.5 * np.sum(solved ** 2, axis=1) - np.sum(
+                    np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)[:, None])
+            chance = np.maximum(chance, evidence)
+            base = np.maximum(base, other.constant - 0.5 * np.sum(drawn ** 2, axis=0))
+        best = np.max(chance - base, axis=0)
+        present_base = max(other.constant - 0.5 * gram[0, 0]
+                           for other, gram in zip(self._points, self._grams))
+        return {names[0]: float((1 + np.sum(best >= value - present_base)) / (1 + count))
+                for names, (value, _) in self.singles().items()}

@@ -1,0 +1,67 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which effects of the catalogue a recording can show at all."""
+
+import numpy as np
+
+from hysteresis_ros.effects import catalogue
+
+# A recorded temperature [degC] that changes by less is a constant with noise on it.
+SMALLEST_CHANGE = 0.5
+
+
+def observable(problem) -> tuple[list[str], dict[str, str]]:
+    """
+    Divide the catalogue into effects to try and effects that this data cannot show.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and model.
+
+    Returns
+    -------
+    list of str, dict of str to str
+        Identifiers to try; identifiers of unobservable effects with the reason.
+    """
+    surroundings = problem.model.surroundings
+    taken = {effect.id for effect in problem.model.effects if not may_differ(problem, effect)}
+    names, unobservable = [], {}
+    for name, effect in catalogue().items():
+        if name in taken or problem.kind not in effect.kinds:
+            continue
+        if problem.catalogue is not None and name not in problem.catalogue:
+            continue
+        if not effect.available(surroundings):
+            continue
+        column = effect.needs_column
+        if effect.needs_transients and problem.settled:
+            unobservable[name] = 'every row is settled'
+        elif column and not any(
+                np.ptp(m.columns[column]) > SMALLEST_CHANGE if column in m.columns else False
+                for m in problem.measurements):
+            unobservable[name] = f'{column} was not recorded or did not change'
+        else:
+            names.append(name)
+    return names, unobservable
+
+
+def present(model, kind):
+    """Return the model's own effect of a kind, or a neutral one."""
+    own = [effect for effect in model.effects if effect.id == kind.id]
+    return own[0] if own else kind(model.surroundings)
+
+
+def may_differ(problem, effect) -> bool:
+    """Whether an effect of the model may be another one here than on the bench that showed it."""
+    return problem.kind == 'arm' and 'bench' in effect.kinds
+
+
+def unaffected(fixed, effects) -> list:
+    """
+    Return the effects of a model that stay as they are beside fitted ones.
+
+    An effect of the wire that the bench has shown may be fitted anew to the wires of an arm.
+    """
+    fitted = {effect.id for effect in effects}
+    return [effect for effect in fixed if effect.id not in fitted]

@@ -1,0 +1,246 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Select the set of effects that explains runs of an arm, by its posterior probability.
+
+All effects and all pairs are scored by linearisation at every start; the best are fitted in full.
+Sets are then grown from the most probable ones, again by linearisation beside each and full fits of
+the best, until none of the most probable sets has not been grown from. What is compared in the end
+are full fits.
+"""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
+from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.discrepancy import covariance, path_difference, sensitivity
+from hysteresis_ros.diagnosis.linearised import Linearised, Start, starts_beside
+from hysteresis_ros.diagnosis.observable import observable
+from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+
+# Drift and noise of the first covariances, as shares of the discrepancy.
+FIRST_POINTS = ((0.1, 0.3), (0.4, 0.6), (1.5, 0.3), (6.0, 0.3))
+# Sets that are begun, for one that is fitted to the end, and steps of what is begun.
+BEGUN, FIRST_STEPS = 5, 3
+# Of several effects each has to take this share off the first error, to be seen beside it.
+LEAST_SHARE = 0.015
+SIGNIFICANCE = 0.05
+
+
+class Selection:
+    """
+    What explains runs of an arm, as far as the catalogue goes.
+
+    Parameters
+    ----------
+    problem : ArmProblem
+    settings : Settings
+    rng : numpy.random.Generator
+    progress : callable
+        ``progress(iterable, total)``, for a progress bar.
+
+    Attributes
+    ----------
+    base : Fit
+        Without any further effect.
+    fits : dict of frozenset of str to Fit
+        The best full fit of each set.
+    unobservable : dict of str to str
+        Effects that this data cannot show, with the reason.
+    """
+
+    def __init__(self, problem, settings, rng, progress):
+        self.problem, self.settings = problem, settings
+        self.rng, self.progress = rng, progress
+        self.names, self.unobservable = observable(problem)
+        self.fixed = list(problem.model.effects)
+        self.gain = sensitivity(problem, self.fixed)
+        predicted = problem.simulate(self.fixed)
+        self.covariance = Covariance(
+            covariance(problem, self.gain, predicted, path_difference(problem, self.fixed),
+                       settings),
+            problem.clock, problem.trial, problem.noise, settings.scale_spread)
+        self.fitter = Fitter(problem, self.covariance)
+        for drift, noise in FIRST_POINTS:
+            self.covariance.add(self.covariance.start(drift, noise))
+        self.covariance.add(self.covariance.fit(problem.measured - predicted))
+        self.base = self.fitter.judge(
+            Fit([], np.zeros(0), predicted, np.zeros((len(predicted), 0))))
+        self.fits: dict[frozenset, Fit] = {frozenset(): self.base}
+        self._grown: set[frozenset] = set()
+        self._refined: set[frozenset] = set()
+        self.limit = self.covariance.largest_error(rng, settings.draws)
+        self.alone: Linearised | None = None
+        self.p_values: dict[str, float] = {}
+
+    def run(self) -> None:
+        """Score all single effects and pairs, fit the best, and grow sets from them."""
+        self.alone = self._beside(self.base)
+        self._fit([effects for _, effects in self.alone.singles().values()])
+        self.p_values = self._significance()
+        self._fit_best(self.alone.pairs())
+        self._grown.add(frozenset())
+        for size in range(1, self.settings.most_effects + 1):
+            self._refine(size)
+            if size == self.settings.most_effects or not self._worth_growing():
+                break
+            for names in self.progress(self._ranked_of(size), self.settings.beam):
+                self.grow(names)
+        self._refine_best()
+
+    def _significance(self) -> dict[str, float]:
+        """Return family-wise p values of single effects, linearised at starts and at fits too."""
+        fitted = []
+        for fit in self.fits.values():
+            if fit.effects:
+                mean, spread = ParameterVector(fit.effects, self.problem.kind).prior()
+                change = fit.predicted - self.base.predicted + fit.jacobian @ (mean - fit.vector)
+                fitted.append(Start(fit.effects[0], change, fit.jacobian * spread))
+        family = Linearised(self.covariance, self.problem.measured - self.base.predicted,
+                            [*self.alone.starts, *fitted])
+        return family.p_values(self.base.point, self.rng, self.settings.draws)
+
+    def _worth_growing(self) -> bool:
+        """Whether no set explains the recording yet, so that larger ones are looked for."""
+        valid = self.valid()
+        return not valid or not self.sufficient(valid[0])
+
+    def grow(self, names) -> None:
+        """Fit the best sets of one more effect than those named."""
+        if names in self._grown:
+            return
+        self._grown.add(names)
+        fit = self.fits[names]
+        found = self._beside(fit).singles()
+        self._fit_best({key: (value, [
+            *(one for one in fit.effects if one.id not in effects[0].replaces), *effects])
+            for key, (value, effects) in found.items()})
+
+    def add(self, fit, effect) -> Fit:
+        """
+        Return the best fit of one more effect together with those of a fit.
+
+        Parameters
+        ----------
+        fit : Fit
+        effect : Effect
+            Its values are one of the starts.
+        """
+        kept = [one for one in fit.effects if one.id not in effect.replaces]
+        starts = [*starts_of(effect, self.problem.kind, self.problem.measured), effect]
+        found = self.fitter.fit([[*kept, start] for start in starts], self._metric(),
+                                FIRST_STEPS)
+        found.sort(key=lambda one: -one.log_evidence)
+        found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
+        return self.fitter.refined(max(found, key=lambda one: one.log_evidence))
+
+    def _beside(self, fit) -> Linearised:
+        """Linearise all other effects beside those of a fit."""
+        taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
+        names = [name for name in self.names if name not in taken]
+        _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
+        return Linearised(self.covariance, self.problem.measured - fit.predicted,
+                          starts_beside(self.fitter, fit, names), fit.jacobian * spread)
+
+    def _fit_best(self, scored) -> None:
+        """Fit the best sets for a few steps, and the best of these to the end."""
+        order = sorted(scored.values(), key=lambda item: -item[0])
+        begun = self.fitter.fit(
+            [effects for _, effects in order[:BEGUN * self.settings.refits]],
+            self._metric(), FIRST_STEPS)
+        begun.sort(key=lambda fit: -fit.log_evidence)
+        self._fit([fit.effects for fit in begun[:self.settings.refits]])
+
+    def _fit(self, sets) -> None:
+        """Fit sets to the end, and keep each where it is the best of its effects."""
+        for fit in self.fitter.fit(sets, self._metric()):
+            self._keep(fit)
+
+    def _metric(self):
+        """Return the covariance in whose units fits are made: the expected discrepancy's."""
+        return self.covariance.points[1]
+
+    def _keep(self, fit) -> None:
+        names = frozenset(fit.names)
+        if names not in self.fits or fit.log_evidence > self.fits[names].log_evidence:
+            self.fits[names] = fit
+
+    def _refine(self, size) -> None:
+        """Estimate the covariance for the most probable sets of a size, then judge all anew."""
+        for names in self._ranked_of(size):
+            if names not in self._refined:
+                self._refined.add(names)
+                self.fits[names] = self.fitter.refined(self.fits[names])
+        self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
+        self.base = self.fits[frozenset()]
+
+    def _refine_best(self) -> None:
+        """Make sure that the answer is compared with what is left if any of it is left out."""
+        for _ in range(self.settings.most_effects):
+            valid = self.valid()
+            if not valid:
+                return
+            missing = [names for one in valid[:self.settings.beam] for names in _subsets(one)
+                       if names not in self.fits]
+            if not missing:
+                return
+            self._fit([[effect for effect in self.fits[one].effects if effect.id in names]
+                       for names in missing for one in valid if names < one][:len(missing)])
+
+    def _ranked_of(self, size) -> list[frozenset]:
+        return [names for names in self.ranked() if len(names) == size][:self.settings.beam]
+
+    def log_posterior(self, names) -> float:
+        """Return the logarithm of a set's posterior probability, but for a constant."""
+        odds = math.log(self.settings.prior / (1.0 - self.settings.prior))
+        return self.fits[names].log_evidence + odds * len(names)
+
+    def ranked(self) -> list[frozenset]:
+        """Return all sets that were fitted, most probable first."""
+        return sorted(self.fits, key=lambda names: -self.log_posterior(names))
+
+    def error(self, names) -> float:
+        """Return the RMSE of a set on all judged rows."""
+        return self.fitter.error(self.fits[names].predicted)
+
+    def structure(self, names) -> float:
+        """Return the root mean square of a set's residual without white noise."""
+        noise = self.fits[names].point.noise
+        return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
+
+    def sufficient(self, names) -> bool:
+        """Whether a set leaves no more than the base model's own error could be."""
+        share = self.settings.residual_share / max(len(names), 1)
+        allowed = self.limit ** 2 + share * self.structure(frozenset()) ** 2
+        return self.structure(names) ** 2 <= allowed
+
+    def valid(self) -> list[frozenset]:
+        """
+        Return the sets that may be the answer, most probable first.
+
+        All values are physical, and each effect matters: without it the error is larger by a
+        practical size, and if others stay, then by more than the base model's own error explains.
+        A single effect also has to explain more than the best of all would by chance.
+        """
+        return [names for names in self.ranked()
+                if not self.fits[names].implausible() and self._each_matters(names)
+                and (len(names) != 1 or self.p_values.get(*names, 1.0) <= SIGNIFICANCE)]
+
+    def _each_matters(self, names) -> bool:
+        error = self.error(names)
+        for without in _subsets(names):
+            if without not in self.fits:
+                continue
+            before = self.error(without)
+            least = max(self.settings.practical * before,
+                        LEAST_SHARE * self.error(frozenset()))
+            if before - error < least or (without and self.sufficient(without)):
+                return False
+        return True
+
+
+def _subsets(names) -> list[frozenset]:
+    """Return the sets that lack one of the effects named."""
+    return [names - {name} for name in names]

@@ -1,0 +1,58 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every number that the selection of effects rests on, with its reason."""
+
+import dataclasses
+
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """
+    Settings of the selection.
+
+    `tools/settings.py` prints how the scores move when each is halved and doubled.
+
+    Attributes
+    ----------
+    rows : int
+        Rows that are judged at most; a covariance of all pairs of rows costs their cube.
+    prior : float
+        Probability of each effect beforehand: about one of a catalogue of thirty.
+    most_effects : int
+        Effects in one set; more are not told apart by one recording.
+    beam : int
+        Sets from which larger ones are grown.
+    refits : int
+        Sets that are fitted in full of those scored by linearisation, a generation.
+    scale_spread : float
+        Spread (natural logarithm) of the discrepancy's size against that seen on the bench,
+        because the arm goes other ways than the bench: a third.
+    correlation : float
+        Length over which the discrepancy changes, as a share of the range of drive and response:
+        weights of the bench's grid are smooth over about half of it.
+    practical : float
+        Smallest reduction of the RMSE that matters to a user.
+    residual_share : float
+        Share of the first mean square that one effect may leave beyond the discrepancy.
+    temper : float
+        By which log posteriors are divided before they are compared: neither the discrepancy's
+        covariance nor an effect's equation is exact, so that many rows do not say as much as they
+        would of a true model (Miller and Dunson, J. Am. Stat. Assoc. 114 (2019) 1113).
+    reported : float
+        Sets less likely than this are not reported as alternatives.
+    draws : int
+        Random draws behind a p value.
+    """
+
+    rows: int = 400
+    prior: float = 0.03
+    most_effects: int = 3
+    beam: int = 3
+    refits: int = 6
+    scale_spread: float = 0.3
+    correlation: float = 0.45
+    practical: float = 0.05
+    residual_share: float = 0.08
+    temper: float = 3.0
+    reported: float = 0.02
+    draws: int = 400

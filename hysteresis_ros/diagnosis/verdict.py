@@ -1,0 +1,166 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The answer of a diagnosis, and what both kinds of measurement say in the same words."""
+
+import dataclasses
+
+import numpy as np
+
+from hysteresis_ros.diagnosis import significance
+from hysteresis_ros.effects import catalogue
+
+# Effects whose signatures agree more than this (|cosine|) cannot be told apart.
+CONFUSED = 0.9
+
+
+@dataclasses.dataclass
+class Diagnosis:
+    """
+    The verdict and what it rests on; `to_dict` gives the fields by the names users rely on.
+
+    Attributes
+    ----------
+    verdict : str
+        'adequate', 'missing', 'unknown' or 'not_excited'.
+    missing : list of str
+        Effects to add, in order.
+    alternatives : list of list of str
+        For each missing effect those that the data cannot tell from it.
+    ranking : list of dict
+        Every effect that was tried, best first.
+    sets : list of dict
+        Sets of effects with their posterior probability and RMSE, most probable first; an empty
+        set is the model as it is, ``['unknown']`` what no effect of the catalogue explains. They
+        add up to 1.
+    noise_floor, structural_error : float
+        White noise of the sensor, and the expected error of the base model, in the unit of the
+        response.
+    unexplained : float
+        Share of the mean square error that nothing explains.
+    experiment : str
+        What to measure next.
+    effects : list of Effect
+        The missing ones, fitted, with intervals.
+    rmse_before, rmse_after : float
+        Held-out error without and with them.
+    not_excited : dict of str to str
+        Unobservable effects, with the reason.
+    event : float or None
+        Time [s] at which something happened that lasts.
+    signal : str
+        Signal in which an unexplained residual shows.
+    resembles : list of str
+        Effects that an unknown one is like; they explain it with implausible values.
+    learned : dict or None
+        A learned term that is offered instead.
+    """
+
+    verdict: str
+    missing: list
+    alternatives: list
+    ranking: list
+    sets: list
+    noise_floor: float
+    structural_error: float
+    unexplained: float
+    experiment: str
+    effects: list
+    rmse_before: float
+    rmse_after: float
+    not_excited: dict
+    event: float | None
+    signal: str
+    resembles: list = dataclasses.field(default_factory=list)
+    learned: dict | None = None
+
+    def to_dict(self) -> dict:
+        """Return plain types for JSON."""
+        content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)
+                   if field.name != 'effects'}
+        content['effects'] = [effect.to_dict() for effect in self.effects]
+        return content
+
+    to_json = to_dict
+
+
+def ranking_row(effect, fit, before: float, after: float, p_value: float, gain: tuple) -> dict:
+    """
+    Return the entry of one effect by itself.
+
+    Parameters
+    ----------
+    effect : Effect
+        Fitted, with intervals.
+    fit : Fit
+    before, after : float
+        RMSE on rows that were not fitted.
+    p_value : float
+    gain : (float, float)
+        Interval of the relative reduction of the RMSE.
+    """
+    return {'effect': effect.id, 'rmse_before': before, 'rmse_after': after,
+            'gain': 1.0 - after / before, 'gain_low': gain[0], 'gain_high': gain[1],
+            'p_value': p_value, 'parameters': effect.to_dict()['parameters'],
+            'plausible': not fit.implausible()}
+
+
+def add_signatures(rows, signatures, weight_columns) -> None:
+    """
+    Say of ranked effects how much refitted weights absorb, and with what each is confused.
+
+    Parameters
+    ----------
+    rows : list of dict
+        See `ranking_row`; gets 'absorbed' and 'confused_with'.
+    signatures : ndarray, shape (effects, n)
+        What each changes in the response.
+    weight_columns : ndarray, shape (n, K)
+        How each weight of H2 moves the response.
+    """
+    if not rows:
+        return
+    alike = significance.cosines(signatures)
+    size = np.linalg.norm(signatures, axis=1)
+    remaining = np.linalg.norm(significance.residualise(weight_columns, signatures), axis=1)
+    absorbed = 1.0 - (remaining / np.maximum(size, 1e-300)) ** 2
+    for row, share, cosines in zip(rows, absorbed, alike):
+        row['absorbed'] = float(np.clip(share, 0.0, 1.0))
+        row['confused_with'] = [other['effect'] for other, cosine in zip(rows, cosines)
+                                if other is not row and cosine > CONFUSED]
+
+
+def in_order(rows, missing) -> list:
+    """Return ranked effects, the missing ones first, then the plausible ones by error."""
+    order = {name: position for position, name in enumerate(missing)}
+    return sorted(rows, key=lambda row: (order.get(row['effect'], len(order)),
+                                         not row['plausible'], row['rmse_after']))
+
+
+def next_experiment(verdict: str, names, alternatives, unobservable) -> str:
+    """
+    Return what to measure next.
+
+    Parameters
+    ----------
+    verdict : str
+    names : sequence of str
+        Missing effects, or those that an unknown one is like.
+    alternatives : list of list of str
+    unobservable : dict of str to str
+    """
+    effects = catalogue()
+    if verdict == 'unknown':
+        return '; '.join([
+            'repeat the recording with another sequence of the drive and look at the residual',
+            *(f'what is like {name} shows best so: {effects[name].experiment}'
+              for name in names)])
+    for name, others in zip(names, alternatives):
+        if others:
+            return (f'to tell {name} from {" and ".join(others)}: '
+                    + '; '.join(effects[one].experiment for one in [name, *others]))
+    if names:
+        return f'record again after `extend --add {",".join(names)}` and compare'
+    if unobservable:
+        name = next(iter(unobservable))
+        return f'to see {name}, too: {effects[name].experiment}'
+    return 'nothing: the model explains this recording'
