@@ -8,6 +8,7 @@ import io
 from pathlib import Path
 import warnings
 
+from hysteresis_ros.atomic import replacing
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.quantities import RESPONSES
 from hysteresis_ros.measurements.table import (
@@ -298,5 +299,6 @@ def write_csv(measurement, path):
     formats = ['%d' if is_whole else '%.12g' for is_whole in whole]
     names = io.StringIO()
     csv.writer(names, lineterminator='').writerow(columns)
-    np.savetxt(path, np.column_stack([v.astype(float) for v in values]), delimiter=',',
-               header=names.getvalue(), comments='', fmt=formats, encoding='utf-8')
+    with replacing(path) as file:
+        np.savetxt(file, np.column_stack([v.astype(float) for v in values]), delimiter=',',
+                   header=names.getvalue(), comments='', fmt=formats)
