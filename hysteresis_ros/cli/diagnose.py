@@ -3,7 +3,7 @@
 """`hysteresis diagnose`: which physical effect the model is missing."""
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, progress, read_all, say, write_json)
+    add_data, add_json, add_model, add_report, progress, read_all, say, write_json)
 
 UNITS = {'angle': (57.29577951308232, 'deg'), 'length': (1e3, 'mm'), 'strain': (100.0, '%'),
          'force': (1.0, 'N')}
@@ -25,7 +25,7 @@ def add_parser(subparsers):
     parser.add_argument('--seed', type=int, default=0, metavar='S',
                         help='of the random draws behind the p values (default: 0)')
     add_json(parser)
-    parser.add_argument('--report', metavar='R.html', help='write one page with all pictures')
+    add_report(parser)
     return parser
 
 

@@ -10,6 +10,7 @@ import warnings
 
 from hysteresis_ros import __version__
 from hysteresis_ros.cli.common import one_line
+from hysteresis_ros.cli.outputs import check_outputs
 from hysteresis_ros.errors import HysteresisError
 from hysteresis_ros.measurements import MeasurementWarning
 
@@ -44,6 +45,7 @@ def main(arguments=None):
         warnings.simplefilter('always', MeasurementWarning)
         warnings.showwarning = show_warning
         try:
+            check_outputs(args)
             return args.run(args) or DONE
         except BrokenPipeError:
             # The reader of our output has left; nothing more can be said to it.
