@@ -230,7 +230,7 @@ def test_a_recorder_that_was_killed(tmp_path):
         read_measurement(bag)
     for file in bag.iterdir():
         file.unlink()
-    with pytest.raises(MeasurementError, match='no metadata.yaml'):
+    with pytest.raises(MeasurementError, match='holds no bag'):
         read_measurement(bag)
 
 

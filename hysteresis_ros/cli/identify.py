@@ -74,9 +74,11 @@ def table(path, responses):
         return None
     measurement, = read_all([path])
     if measurement.response not in responses:
+        swapped = measurement.response in ('force', 'length', 'strain')
         raise MeasurementError(
-            f'{path}: the table measures {measurement.response}, {" or ".join(responses)} is '
-            'needed here; are --force and --length swapped?')
+            f'{path}: the table measures {measurement.response}, but {" or ".join(responses)} is '
+            'needed here; ' + ('are --force and --length swapped?' if swapped
+                               else 'identify takes bench tables'))
     return measurement
 
 

@@ -4,7 +4,7 @@
 Paths on the command line: which are read, which are written, and that none destroys another.
 
 Each option that takes a path has one of the types below as its argparse `type`; the values keep
-that type, so that `check_outputs` finds the inputs and outputs of any command by itself.
+that type, so that `check_paths` finds the inputs and outputs of any command by itself.
 """
 
 import argparse
@@ -44,9 +44,9 @@ class Given(NamedTuple):
         return f'{self.option} {self.path}'
 
 
-def check_outputs(args: argparse.Namespace) -> None:
+def check_paths(args: argparse.Namespace) -> None:
     """
-    Refuse output paths that would destroy an input or another output, or cannot be written.
+    Refuse outputs that would destroy an input or another output, or cannot be written.
 
     Parameters
     ----------
@@ -63,9 +63,10 @@ def check_outputs(args: argparse.Namespace) -> None:
     folders = list(given(args, OutputFolder))
     files = [output for output in given(args, OutputFile)
              if not (isinstance(output.path, OutputFileOrStdout) and output.path == '-')]
+    for any_path in [*inputs, *folders, *files]:
+        if not any_path.path:
+            raise ParameterError(f'{any_path.option}: the path is empty; name a file or folder')
     for output in [*folders, *files]:
-        if not output.path:
-            raise ParameterError(f'{output.option}: the path is empty; name a file or folder')
         for read in inputs:
             refuse_input(output, read)
     refuse_twice([*folders, *files])

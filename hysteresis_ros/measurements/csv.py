@@ -16,6 +16,7 @@ from hysteresis_ros.measurements.table import (
 import numpy as np
 
 LONGEST_LINE = 1_000_000
+SETTINGS = ('.yaml', '.yml', '.json')
 
 
 def read_csv(path):
@@ -102,7 +103,12 @@ def parse(path, check):
         Warnings.
 
     """
+    if path.suffix.lower() in SETTINGS:
+        raise MeasurementError(f'{path}: a {path.suffix[1:].upper()} file, no table; give a CSV '
+                               'file or a rosbag2 folder')
     try:
+        if path.is_dir():
+            raise MeasurementError(f'{path}: a folder, no table; give a CSV file')
         names, first = header(path)
         check(names)
         return numbers_of(path, names, first)
@@ -150,7 +156,16 @@ def header(path):
             first += 1
             if not line:
                 raise MeasurementError(f'{path}: the file is empty')
-    cells = [cell.strip() for cell in next(csv.reader([line.strip('\r\n')]))]
+    if '\0' in line:
+        raise MeasurementError(f'{path}: binary data, no table; give a CSV file')
+    if len(line) == LONGEST_LINE:
+        raise MeasurementError(f'{path}: line {first} has more than {LONGEST_LINE - 1} characters, '
+                               'so it does not name columns; give a CSV file')
+    try:
+        cells = [cell.strip() for cell in next(csv.reader([line.strip('\r\n')]))]
+    except csv.Error as error:
+        raise MeasurementError(
+            f'{path}: line {first}: {error}; give a CSV file') from None
     if len(cells) == 1:
         for separator, name in ((';', 'semicolons'), ('\t', 'tabs'), ('|', 'bars')):
             if separator in cells[0]:
