@@ -62,6 +62,14 @@ def test_identify_prints_table_one_and_keeps_what_it_found(bench, capsys):
     assert MuscleModel.load(bench / 'plain.yaml').kind == 'preisach'
 
 
+def test_compare_puts_everything_in_the_folder_that_it_makes(bench, tmp_path):
+    out = tmp_path / 'made' / 'here'
+    assert main(['compare', '--model', f'{bench}/model.yaml', '--data', f'{bench}/force.csv',
+                 '--json', f'{out}/c.json', '--report', f'{out}/c.html', '--plots',
+                 f'{out}']) == 0
+    assert {'c.json', 'c.html', 'overlay.png'} <= {path.name for path in out.iterdir()}
+
+
 def test_compare_writes_table_json_page_and_pictures(bench, capsys):
     out = bench / 'out'
     out.mkdir(exist_ok=True)
