@@ -69,6 +69,12 @@ def add_json(parser):
                         help='write what is printed for programs; - for standard output')
 
 
+def add_settled(parser):
+    """Add the option that reduces continuous runs to their settled states."""
+    parser.add_argument('--settled', action='store_true',
+                        help='of a continuous run take only the ends of its holds')
+
+
 def add_report(parser):
     """Add the option that writes a page."""
     parser.add_argument('--report', type=OutputFile, metavar='R.html',

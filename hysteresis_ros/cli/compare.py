@@ -7,7 +7,8 @@ import sys
 
 from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, one_line, read_all, say, Steps, write_json)
+    add_data, add_json, add_model, add_report, add_settled, one_line, read_all, say, Steps,
+    write_json)
 from hysteresis_ros.cli.outputs import OutputFolder
 
 
@@ -20,8 +21,7 @@ def add_parser(subparsers):
         'of the linear model; where the model fails; pictures.')
     add_model(parser)
     add_data(parser)
-    parser.add_argument('--settled', action='store_true',
-                        help='of a continuous run take only the ends of its holds')
+    add_settled(parser)
     add_json(parser)
     add_report(parser)
     parser.add_argument('--plots', type=OutputFolder, metavar='DIR',

@@ -3,7 +3,7 @@
 """`hysteresis extend`: add effects to a model and see the error fall."""
 
 from hysteresis_ros.cli.common import (
-    add_json, add_model, add_report, read_all, say, write_json)
+    add_json, add_model, add_report, add_settled, read_all, say, write_json)
 from hysteresis_ros.cli.diagnose import UNITS
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
@@ -24,8 +24,7 @@ def add_parser(subparsers):
                         help='recordings that are not fitted')
     parser.add_argument('--namespace', metavar='NS',
                         help='which arm to take from a bag that recorded several')
-    parser.add_argument('--settled', action='store_true',
-                        help='of a continuous run take only the ends of its holds')
+    add_settled(parser)
     parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='MODEL.yaml')
     add_json(parser)
     add_report(parser)
