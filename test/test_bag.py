@@ -15,7 +15,7 @@ import pytest
 rosbag2 = pytest.importorskip('rosbags.rosbag2')
 typesys = pytest.importorskip('rosbags.typesys')
 
-STORE = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+STORE = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
 START = 1_700_000_000_000_000_000
 FLOAT, JOINTS = 'std_msgs/msg/Float64', 'sensor_msgs/msg/JointState'
 AMBIENT, STATUS = 'sensor_msgs/msg/Temperature', 'diagnostic_msgs/msg/DiagnosticArray'
@@ -230,7 +230,7 @@ def test_a_recorder_that_was_killed(tmp_path):
         read_measurement(bag)
     for file in bag.iterdir():
         file.unlink()
-    with pytest.raises(MeasurementError, match='no metadata.yaml'):
+    with pytest.raises(MeasurementError, match='holds no bag'):
         read_measurement(bag)
 
 
@@ -254,8 +254,8 @@ def test_messages_are_decoded_like_rosbags_does():
 
     assert decode_float64(data(voltage(-2.5))) == -2.5
     stamp, names, positions = decode_joint_state(data(joints(12.25, [1, 2], ('a', 'bcd'))))
-    assert (stamp, names, positions) == (12.25, ['a', 'bcd'], (1.0, 2.0))
-    assert decode_temperature(data(ambient(21.5))) == (0.0, 21.5)
+    assert (stamp, names, positions) == (12.25, ['a', 'bcd'], [1.0, 2.0])
+    assert decode_temperature(data(ambient(21.5))) == 21.5
     assert decode_diagnostics(data(status('ready'))) == [
         ('hardware_bridge: board', {'port': 'sim://bicep', 'state': 'ready'})]
     big = bytes(STORE.serialize_cdr(voltage(3.5)[1], FLOAT, little_endian=False))

@@ -4,10 +4,11 @@
 
 import argparse
 import json
-from pathlib import Path
 import sys
 
-from hysteresis_ros.errors import MeasurementError, ParameterError
+from hysteresis_ros.atomic import write_text
+from hysteresis_ros.cli.outputs import InputPath, OutputFile, OutputFileOrStdout
+from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import read_measurement, settled_rows
 
 
@@ -50,7 +51,7 @@ def numbers(text):
 
 def add_data(parser, name='--data', required=True):
     """Add the option that names measurements, and how bags are read."""
-    parser.add_argument(name, nargs='+', required=required, metavar='FILE',
+    parser.add_argument(name, nargs='+', type=InputPath, required=required, metavar='FILE',
                         help='CSV files or rosbag2 folders')
     parser.add_argument('--namespace', metavar='NS',
                         help='which arm to take from a bag that recorded several')
@@ -58,13 +59,26 @@ def add_data(parser, name='--data', required=True):
 
 def add_model(parser):
     """Add the option that names the model."""
-    parser.add_argument('--model', required=True, metavar='M.yaml', help='an identified model')
+    parser.add_argument('--model', type=InputPath, required=True, metavar='M.yaml',
+                        help='an identified model')
 
 
 def add_json(parser):
     """Add the option that writes the result for programs."""
-    parser.add_argument('--json', metavar='J.json',
+    parser.add_argument('--json', type=OutputFileOrStdout, metavar='J.json',
                         help='write what is printed for programs; - for standard output')
+
+
+def add_settled(parser):
+    """Add the option that reduces continuous runs to their settled states."""
+    parser.add_argument('--settled', action='store_true',
+                        help='of a continuous run take only the ends of its holds')
+
+
+def add_report(parser):
+    """Add the option that writes a page."""
+    parser.add_argument('--report', type=OutputFile, metavar='R.html',
+                        help='write one page with all pictures')
 
 
 def read_all(paths, namespace=None, settled=False):
@@ -170,16 +184,9 @@ def write_json(path, content):
     if path == '-':
         print(text)
     else:
-        Path(path).write_text(text + '\n', encoding='utf-8')
+        write_text(path, text + '\n')
 
 
 def say(args, text):
     """Print for a person, unless standard output is a program's."""
     print(text, file=sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout)
-
-
-def must_differ(output, *inputs):
-    """Refuse to write over a file that is read."""
-    for path in inputs:
-        if path is not None and Path(path).resolve() == Path(output).resolve():
-            raise ParameterError(f'{output}: the output would overwrite an input; name another')

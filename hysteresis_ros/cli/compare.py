@@ -5,8 +5,11 @@
 from pathlib import Path
 import sys
 
+from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, one_line, read_all, say, Steps, write_json)
+    add_data, add_json, add_model, add_report, add_settled, one_line, read_all, say, Steps,
+    write_json)
+from hysteresis_ros.cli.outputs import OutputFolder
 
 
 def add_parser(subparsers):
@@ -18,11 +21,11 @@ def add_parser(subparsers):
         'of the linear model; where the model fails; pictures.')
     add_model(parser)
     add_data(parser)
-    parser.add_argument('--settled', action='store_true',
-                        help='of a continuous run take only the ends of its holds')
+    add_settled(parser)
     add_json(parser)
-    parser.add_argument('--report', metavar='R.html', help='write one page with all pictures')
-    parser.add_argument('--plots', metavar='DIR', help='write the pictures as PNG files')
+    add_report(parser)
+    parser.add_argument('--plots', type=OutputFolder, metavar='DIR',
+                        help='write the pictures as PNG files')
     return parser
 
 
@@ -41,6 +44,8 @@ def run(args):
         if note not in known:
             print(f'hysteresis: warning: {one_line(note)}', file=sys.stderr)
     say(args, comparison.to_text())
+    if args.plots:
+        Path(args.plots).mkdir(parents=True, exist_ok=True)
     if args.json:
         write_json(args.json, comparison.to_json())
     if args.report or args.plots:
@@ -55,11 +60,8 @@ def draw(args, comparison, steps):
     steps('drawing')
     pictures = rendered(figures(comparison))
     if args.plots:
-        folder = Path(args.plots)
-        folder.mkdir(parents=True, exist_ok=True)
         for name, picture in pictures.items():
-            (folder / f'{name}.png').write_bytes(picture)
+            write_bytes(Path(args.plots) / f'{name}.png', picture)
     if args.report:
-        Path(args.report).write_text(
-            comparison_page(comparison, pictures, args.model), encoding='utf-8')
+        write_text(args.report, comparison_page(comparison, pictures, args.model))
     steps.clear()

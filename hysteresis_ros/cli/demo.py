@@ -9,11 +9,17 @@ import shutil
 
 import numpy as np
 
+from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import add_json, progress, say, write_json
+from hysteresis_ros.cli.outputs import OutputFolder
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements import settled_rows
 
 VALUES = 40
+# Says that the demo may remove its own entries of this folder; others are never touched.
+MARK = '.hysteresis_demo'
+ENTRIES = ('bench', 'model.yaml', 'run', 'run.log', 'extended.yaml', 'run_extended',
+           'run_extended.log', 'demo.png')
 # Time for which a target is held [s]: until the arm rests, or while it is still on its way, at
 # which the arm's time may not run much faster than the nodes can follow.
 SETTLED_HOLD = 30.0
@@ -29,7 +35,7 @@ def add_parser(subparsers):
         'rosbag2 bag, reads it back, and compares: the rows of Table I for the arm. With --hidden '
         'a physical effect is hidden in the arm, found, added to the model, and the arm driven '
         'again.')
-    parser.add_argument('-o', '--output', default='demo', metavar='DIR',
+    parser.add_argument('-o', '--output', type=OutputFolder, default='demo', metavar='DIR',
                         help='folder for everything that is written (default: demo)')
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='of arm and sequences')
     parser.add_argument('--speed', type=float, default=60.0, metavar='X',
@@ -95,10 +101,7 @@ def run(args):
     hidden = drawn(args)
     pace = pace_of(args, hidden)
     folder = Path(args.output)
-    if folder.exists() and not (folder / 'model.yaml').exists() and any(folder.iterdir()):
-        raise ParameterError(f'{folder}: not empty and not a demo; name another folder with -o')
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    prepare(folder)
     model = bench_model(args, folder)
     sequences = target_sequences(model, args)
     result = {'runs': []}
@@ -117,6 +120,19 @@ def run(args):
     say(args, f'\nPicture: {folder / "demo.png"}; recording: {folder / "run"} (rosbag2, mcap)')
     if args.json:
         write_json(args.json, result)
+
+
+def prepare(folder: Path) -> None:
+    """Make the folder, or remove what an earlier demo wrote into it and nothing else."""
+    if folder.exists() and not (folder / MARK).exists() and any(folder.iterdir()):
+        raise ParameterError(f'{folder}: not empty and not a demo; name another folder with -o')
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / MARK, 'Written by `hysteresis demo`, which replaces its files here.\n')
+    for entry in (folder / name for name in ENTRIES):
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink(missing_ok=True)
 
 
 def bench_model(args, folder):
@@ -281,4 +297,4 @@ def draw(path, sequences, runs, linear, again, pace):
     axes[0, 0].set_ylabel('angle [deg]')
     axes[1, 0].set_ylabel('error [deg]')
     axes[0, 0].legend(loc='best', fontsize=8)
-    Path(path).write_bytes(png(figure))
+    write_bytes(path, png(figure))

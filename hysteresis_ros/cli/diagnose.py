@@ -3,7 +3,7 @@
 """`hysteresis diagnose`: which physical effect the model is missing."""
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, progress, read_all, say, write_json)
+    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, write_json)
 
 UNITS = {'angle': (57.29577951308232, 'deg'), 'length': (1e3, 'mm'), 'strain': (100.0, '%'),
          'force': (1.0, 'N')}
@@ -18,14 +18,13 @@ def add_parser(subparsers):
         "base model's own error could.")
     add_model(parser)
     add_data(parser)
-    parser.add_argument('--settled', action='store_true',
-                        help='of a continuous run take only the ends of its holds')
+    add_settled(parser)
     parser.add_argument('--jobs', type=int, default=-1, metavar='N',
                         help='processes (default: one for each core)')
     parser.add_argument('--seed', type=int, default=0, metavar='S',
                         help='of the random draws behind the p values (default: 0)')
     add_json(parser)
-    parser.add_argument('--report', metavar='R.html', help='write one page with all pictures')
+    add_report(parser)
     return parser
 
 

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis extend`: add effects to a model and see the error fall."""
 
-from hysteresis_ros.cli.common import add_json, add_model, must_differ, read_all, say, write_json
+from hysteresis_ros.cli.common import (
+    add_json, add_model, add_report, add_settled, read_all, say, write_json)
 from hysteresis_ros.cli.diagnose import UNITS
+from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
 
 def add_parser(subparsers):
@@ -16,17 +18,16 @@ def add_parser(subparsers):
     add_model(parser)
     parser.add_argument('--add', required=True, metavar='EFFECT[,EFFECT]',
                         help='effects to add, in order')
-    parser.add_argument('--data', nargs='+', required=True, metavar='TRAIN',
+    parser.add_argument('--data', nargs='+', type=InputPath, required=True, metavar='TRAIN',
                         help='recordings to fit: CSV files or rosbag2 folders')
-    parser.add_argument('--test', nargs='+', default=[], metavar='TEST',
+    parser.add_argument('--test', nargs='+', type=InputPath, default=[], metavar='TEST',
                         help='recordings that are not fitted')
     parser.add_argument('--namespace', metavar='NS',
                         help='which arm to take from a bag that recorded several')
-    parser.add_argument('--settled', action='store_true',
-                        help='of a continuous run take only the ends of its holds')
-    parser.add_argument('-o', '--output', required=True, metavar='MODEL.yaml')
+    add_settled(parser)
+    parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='MODEL.yaml')
     add_json(parser)
-    parser.add_argument('--report', metavar='R.html', help='write one page with all pictures')
+    add_report(parser)
     return parser
 
 
@@ -35,7 +36,6 @@ def run(args):
     from hysteresis_ros.diagnosis.extend import extend
     from hysteresis_ros.model import MuscleModel
 
-    must_differ(args.output, *args.data, *args.test)
     model = MuscleModel.load(args.model)
     train = read_all(args.data, args.namespace, args.settled)
     test = read_all(args.test, args.namespace, args.settled)

@@ -3,7 +3,8 @@
 """`hysteresis identify`: from bench tables to a model."""
 
 from hysteresis_ros.cli.common import (
-    add_json, must_differ, numbers, progress, read_all, say, Steps, write_json)
+    add_json, numbers, progress, read_all, say, Steps, write_json)
+from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.errors import MeasurementError, ParameterError
 
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
@@ -15,13 +16,15 @@ def add_parser(subparsers):
         'identify', help='fit a model to bench tables',
         description='Fits H1 to the force table, H2 to the length table and the linear model to '
         'both, on the trials named, verifies on the others, and prints the rows of Table I.')
-    parser.add_argument('--force', metavar='F.csv', help='force at resting length')
-    parser.add_argument('--length', metavar='L.csv', help='length under constant loads')
+    parser.add_argument('--force', type=InputPath, metavar='F.csv', help='force at resting length')
+    parser.add_argument('--length', type=InputPath, metavar='L.csv',
+                        help='length under constant loads')
     parser.add_argument('--force-trials', type=numbers, metavar='0',
                         help='trials of the force table to fit (default: all)')
     parser.add_argument('--length-trials', type=numbers, metavar='0-3',
                         help='trials of the length table to fit (default: all)')
-    parser.add_argument('--geometry', metavar='G.yaml', help='the arm that the muscle will move')
+    parser.add_argument('--geometry', type=InputPath, metavar='G.yaml',
+                        help='the arm that the muscle will move')
     parser.add_argument('--levels', nargs=2, type=int, default=(10, 20), metavar=('N1', 'N2'),
                         help='levels of H1 and H2 (default: 10 20)')
     parser.add_argument('--operator', choices=OPERATORS,
@@ -32,7 +35,7 @@ def add_parser(subparsers):
                         'those that the tables prove (auto), or those named')
     parser.add_argument('--anchored', action='store_true',
                         help='tie H1(0) to the pretension and H2(0) to zero')
-    parser.add_argument('-o', '--output', required=True, metavar='MODEL.yaml')
+    parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='MODEL.yaml')
     add_json(parser)
     return parser
 
@@ -44,7 +47,6 @@ def run(args):
 
     if args.force is None and args.length is None:
         raise ParameterError('nothing to identify; give --length, --force or both')
-    must_differ(args.output, args.force, args.length, args.geometry)
     steps = Steps()
     geometry = BicepGeometry.from_yaml(args.geometry) if args.geometry else None
     force = table(args.force, ('force',))
@@ -72,9 +74,11 @@ def table(path, responses):
         return None
     measurement, = read_all([path])
     if measurement.response not in responses:
+        swapped = measurement.response in ('force', 'length', 'strain')
         raise MeasurementError(
-            f'{path}: the table measures {measurement.response}, {" or ".join(responses)} is '
-            'needed here; are --force and --length swapped?')
+            f'{path}: the table measures {measurement.response}, but {" or ".join(responses)} is '
+            'needed here; ' + ('are --force and --length swapped?' if swapped
+                               else 'identify takes bench tables'))
     return measurement
 
 

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis invert`: voltages for a reference (Eqs. 12, 14, 15, 21 and 22)."""
 
-from hysteresis_ros.cli.common import add_model, must_differ
+from hysteresis_ros.cli.common import add_model
+from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.errors import MeasurementError, ParameterError, RangeError
 import numpy as np
 
@@ -17,10 +18,10 @@ def add_parser(subparsers):
         'length, or angle; adds the voltage (or whatever drives the muscle) for each, and '
         'whether it is saturated because the reference is out of reach.')
     add_model(parser)
-    parser.add_argument('--reference', required=True, metavar='REF.csv')
+    parser.add_argument('--reference', type=InputPath, required=True, metavar='REF.csv')
     parser.add_argument('--method', choices=('preisach', 'linear'), default='preisach',
                         help='the inverse with memory (default), or that of the linear model')
-    parser.add_argument('-o', '--output', required=True, metavar='VOLTS.csv')
+    parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='VOLTS.csv')
     return parser
 
 
@@ -29,7 +30,6 @@ def run(args):
     from hysteresis_ros.measurements import read_reference, write_csv
     from hysteresis_ros.model import MuscleModel
 
-    must_differ(args.output, args.model, args.reference)
     model = MuscleModel.load(args.model)
     reference = read_reference(args.reference)
     drive, saturated = invert(model, reference, args.method)

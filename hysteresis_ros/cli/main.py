@@ -10,6 +10,7 @@ import warnings
 
 from hysteresis_ros import __version__
 from hysteresis_ros.cli.common import one_line
+from hysteresis_ros.cli.outputs import check_paths
 from hysteresis_ros.errors import HysteresisError
 from hysteresis_ros.measurements import MeasurementWarning
 
@@ -44,6 +45,7 @@ def main(arguments=None):
         warnings.simplefilter('always', MeasurementWarning)
         warnings.showwarning = show_warning
         try:
+            check_paths(args)
             return args.run(args) or DONE
         except BrokenPipeError:
             # The reader of our output has left; nothing more can be said to it.
@@ -94,6 +96,8 @@ def build_parser(arguments):
 
 def described(error):
     """Return what an error says; for one of the system the file comes first."""
+    if isinstance(error, IsADirectoryError) and error.filename:
+        return f'{error.filename}: is a folder; name a file'
     if isinstance(error, OSError) and error.strerror and error.filename:
         return f'{error.filename}: {error.strerror}'
     return str(error) or type(error).__name__

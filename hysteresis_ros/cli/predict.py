@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis predict`: the response to a recording's inputs."""
 
-from hysteresis_ros.cli.common import add_data, add_model, must_differ, read_all
+from hysteresis_ros.cli.common import add_data, add_model, read_all
+from hysteresis_ros.cli.outputs import OutputFile
 
 
 def add_parser(subparsers):
@@ -15,7 +16,7 @@ def add_parser(subparsers):
     add_data(parser)
     parser.add_argument('--method', choices=('preisach', 'linear'), default='preisach',
                         help='the hysteresis model with its effects (default), or the linear one')
-    parser.add_argument('-o', '--output', required=True, metavar='OUT.csv')
+    parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='OUT.csv')
     return parser
 
 
@@ -27,7 +28,6 @@ def run(args):
 
     if len(args.data) > 1:
         raise ParameterError('predict takes one measurement; call it once for each')
-    must_differ(args.output, args.model, *args.data)
     model = MuscleModel.load(args.model)
     measurement, = read_all(args.data, args.namespace)
     predicted = model.predict(measurement, method=args.method)

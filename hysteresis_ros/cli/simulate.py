@@ -5,6 +5,8 @@
 import argparse
 import math
 
+from hysteresis_ros.cli.outputs import OutputFolder
+
 DESCRIPTION = """\
 Carries out an experiment in the virtual laboratory, on physics that shares nothing with the
 models, and writes the tables that a user would have. No file says what was hidden in it.
@@ -17,7 +19,7 @@ def add_parser(subparsers):
         'simulate', help='measurements of the virtual laboratory', description=DESCRIPTION)
     parser.add_argument('protocol', metavar='PROTOCOL',
                         help='bench, arm-steps, arm-dynamic, ...')
-    parser.add_argument('-o', '--output', required=True, metavar='DIR')
+    parser.add_argument('-o', '--output', type=OutputFolder, required=True, metavar='DIR')
     parser.add_argument('--effect', action='append', default=[], type=effect,
                         metavar='NAME[=STRENGTH]',
                         help='hide an effect; strength 1 is strong (default), 0.4 weak')

@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnosis and extension as one self-contained page: the plain verdict first."""
 
-from pathlib import Path
-
 import numpy as np
 
 from hysteresis_ros import __version__
+from hysteresis_ros.atomic import write_text
 from hysteresis_ros.diagnosis import page
 from hysteresis_ros.diagnosis.compare import compare
 from hysteresis_ros.diagnosis.compare_page import CAPTIONS
@@ -110,8 +109,7 @@ def write_extension(path, model, extension, train, test, model_path) -> None:
 
 
 def _write(path, title, parts):
-    Path(path).write_text(page.page(title, *parts, footer=f'hysteresis_ros {__version__}'),
-                          encoding='utf-8')
+    write_text(path, page.page(title, *parts, footer=f'hysteresis_ros {__version__}'))
 
 
 def _where(comparison):

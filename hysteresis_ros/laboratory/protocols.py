@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from hysteresis_ros.atomic import write_text
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import sequences
 from hysteresis_ros.laboratory.bench import HOLD
@@ -158,7 +159,7 @@ def write_protocol(name: str, directory, effects: Mapping[str, float] | None = N
     files = [folder / file for file in tables]
     if name == 'bench':
         files.append(folder / GEOMETRY_FILE)
-        files[-1].write_text(yaml.safe_dump(GEOMETRY, sort_keys=False), encoding='utf-8')
+        write_text(files[-1], yaml.safe_dump(GEOMETRY, sort_keys=False))
     return files
 
 

@@ -183,7 +183,7 @@ def collect(path, bag, topics):
                     angle[2].append(position)
             elif role == 'ambient_temperature':
                 ambient[0].append(received)
-                ambient[1].append(decode_temperature(data)[1])
+                ambient[1].append(decode_temperature(data))
             elif role == 'diagnostics':
                 busy = bridge_initialises(decode_diagnostics(data), namespace)
                 if busy is not None:

@@ -63,14 +63,16 @@ def storage_of(path):
     else:
         files = sorted(p for p in path.iterdir() if p.name.removesuffix('.zstd').endswith(SUFFIXES))
         whole = path
-        if not (path / 'metadata.yaml').exists():
+        if not (path / 'metadata.yaml').exists() and files:
             if len(files) != 1:
                 raise MeasurementError(
                     f'{path}: no metadata.yaml; the recorder did not end cleanly. Run: '
                     'ros2 bag reindex FOLDER')
             whole = files[0]
     if not files:
-        raise MeasurementError(f'{path}: the folder holds no bag (*.mcap or *.db3)')
+        tables = sorted(p.name for p in path.glob('*.csv'))
+        raise MeasurementError(f'{path}: the folder holds no bag (*.mcap or *.db3)' + (
+            f'; to read its tables, name the files, such as {path / tables[0]}' if tables else ''))
     if all(file.stat().st_size == 0 for file in files):
         raise MeasurementError(
             f'{path}: the bag is empty (0 bytes); its recorder was killed before it wrote. '

@@ -8,6 +8,7 @@ import io
 from pathlib import Path
 import warnings
 
+from hysteresis_ros.atomic import replacing
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.quantities import RESPONSES
 from hysteresis_ros.measurements.table import (
@@ -15,6 +16,7 @@ from hysteresis_ros.measurements.table import (
 import numpy as np
 
 LONGEST_LINE = 1_000_000
+SETTINGS = ('.yaml', '.yml', '.json')
 
 
 def read_csv(path):
@@ -101,7 +103,12 @@ def parse(path, check):
         Warnings.
 
     """
+    if path.suffix.lower() in SETTINGS:
+        raise MeasurementError(f'{path}: a {path.suffix[1:].upper()} file, no table; give a CSV '
+                               'file or a rosbag2 folder')
     try:
+        if path.is_dir():
+            raise MeasurementError(f'{path}: a folder, no table; give a CSV file')
         names, first = header(path)
         check(names)
         return numbers_of(path, names, first)
@@ -149,7 +156,16 @@ def header(path):
             first += 1
             if not line:
                 raise MeasurementError(f'{path}: the file is empty')
-    cells = [cell.strip() for cell in next(csv.reader([line.strip('\r\n')]))]
+    if '\0' in line:
+        raise MeasurementError(f'{path}: binary data, no table; give a CSV file')
+    if len(line) == LONGEST_LINE:
+        raise MeasurementError(f'{path}: line {first} has more than {LONGEST_LINE - 1} characters, '
+                               'so it does not name columns; give a CSV file')
+    try:
+        cells = [cell.strip() for cell in next(csv.reader([line.strip('\r\n')]))]
+    except csv.Error as error:
+        raise MeasurementError(
+            f'{path}: line {first}: {error}; give a CSV file') from None
     if len(cells) == 1:
         for separator, name in ((';', 'semicolons'), ('\t', 'tabs'), ('|', 'bars')):
             if separator in cells[0]:
@@ -298,5 +314,6 @@ def write_csv(measurement, path):
     formats = ['%d' if is_whole else '%.12g' for is_whole in whole]
     names = io.StringIO()
     csv.writer(names, lineterminator='').writerow(columns)
-    np.savetxt(path, np.column_stack([v.astype(float) for v in values]), delimiter=',',
-               header=names.getvalue(), comments='', fmt=formats, encoding='utf-8')
+    with replacing(path) as file:
+        np.savetxt(file, np.column_stack([v.astype(float) for v in values]), delimiter=',',
+                   header=names.getvalue(), comments='', fmt=formats)

@@ -3,13 +3,13 @@
 """The model file: one YAML mapping, read by safe load only."""
 
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import yaml
 
+from hysteresis_ros.atomic import write_text
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import HysteresisError, ModelFileError
@@ -63,12 +63,9 @@ def save(model: MuscleModel, path) -> None:
     OSError
         If the file cannot be written.
     """
-    path = Path(path)
-    text = '# Model of a muscle with hysteresis, written by hysteresis_ros.\n' + yaml.safe_dump(
-        to_dict(model), sort_keys=False, default_flow_style=None, width=100)
-    partial = path.with_name(path.name + '.part')
-    partial.write_text(text, encoding='utf-8')
-    os.replace(partial, path)
+    write_text(path, '# Model of a muscle with hysteresis, written by hysteresis_ros.\n'
+               + yaml.safe_dump(to_dict(model), sort_keys=False, default_flow_style=None,
+                                width=100))
 
 
 def load(path) -> MuscleModel:
