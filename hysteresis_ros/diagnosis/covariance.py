@@ -94,8 +94,8 @@ class Covariance:
         self._scale = max(self.size, self.resolution)
         self._middle = 0.5 * np.log(shortest * span)
         self._low = np.array([-LARGEST_SCALE, np.log(self._scale / WIDEST),
-                              np.log(0.7 * shortest), np.log(self.resolution)])
-        self._high = np.array([LARGEST_SCALE, np.log(WIDEST * self._scale), np.log(3.0 * span),
+                              np.log(2.0 * shortest), np.log(self.resolution)])
+        self._high = np.array([LARGEST_SCALE, np.log(WIDEST * self._scale), np.log(max(3.0 * span, 2.0 * shortest)),
                                np.log(WIDEST * self._scale)])
         self._high = np.maximum(self._high, self._low)
         self.points: list[Point] = []
@@ -166,14 +166,17 @@ class Covariance:
         residual : ndarray, shape (n,)
             Measured less simulated.
         values : ndarray, shape (4,), optional
-            Where to begin.
+            Where to begin; by default both where all is noise and where all is drift.
         """
-        start = self.start() if values is None else np.clip(values, self._low, self._high)
+        share = float(np.sqrt(np.mean(residual ** 2))) / self._scale
+        starts = [self.start(0.1, share), self.start(share, 0.1)] if values is None else [
+            np.clip(values, self._low, self._high)]
         with np.errstate(all='ignore'):
-            found = optimize.minimize(
+            found = [optimize.minimize(
                 self._cost, start, (residual,), jac=True, method='L-BFGS-B',
                 bounds=list(zip(self._low, self._high)), options={'maxfun': EVALUATIONS})
-        return found.x
+                for start in starts]
+        return min(found, key=lambda one: one.fun).x
 
     def _cost(self, values, residual):
         discrepancy, drift, white = self._parts(values)

@@ -1,0 +1,97 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Closed-form evidences of linearised effects, and p values that hold for all of them."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.linearised import Linearised, Start
+from hysteresis_ros.effects import catalogue
+
+NAMES = list(catalogue())
+
+
+def make(trials, rows, seed=0):
+    """Return covariances and smooth effects on some trials of settled rows."""
+    rng = np.random.default_rng(seed)
+    trial = np.repeat(np.arange(trials), rows)
+    drive = np.concatenate([np.cumsum(rng.standard_normal(rows)) for _ in range(trials)])
+    drive = (drive - drive.min()) / np.ptp(drive)
+    discrepancy = 1e-6 * np.exp(-0.5 * ((drive[:, None] - drive[None, :]) / 0.45) ** 2)
+    covariance = Covariance(discrepancy, 30.0 * np.arange(1.0, len(trial) + 1.0), trial, 1e-4, 0.3)
+    starts = []
+    for number in range(12):
+        shape = np.cos(np.pi * (1 + number // 2) * drive + number)
+        starts.append(Start(catalogue()[NAMES[number]](), np.zeros(len(trial)),
+                            0.05 * shape[:, None]))
+    return covariance, starts
+
+
+def autoregressive(rng, trials, rows, rho):
+    """Return AR(1) noise of 2 degrees, trial by trial."""
+    noise = rng.standard_normal((trials, rows))
+    for row in range(1, rows):
+        noise[:, row] = rho * noise[:, row - 1] + np.sqrt(1.0 - rho ** 2) * noise[:, row]
+    return 0.035 * noise.ravel()
+
+
+@pytest.mark.parametrize('chosen', [[[3]], [[1, 4]]])
+def test_the_evidence_is_that_of_the_marginal_gaussian(chosen):
+    """y ~ N(change, K + A A'), with the parameters integrated out."""
+    covariance, starts = make(2, 40)
+    point = covariance.add(covariance.start(0.4, 2.0))
+    rng = np.random.default_rng(1)
+    residual = 0.01 * rng.standard_normal(80)
+    for start in starts:
+        start.change += 0.003 * rng.standard_normal(80)
+    found = Linearised(covariance, residual, starts).evidences(chosen)[0]
+    own = [starts[index] for index in chosen[0]]
+    columns = np.column_stack([start.columns for start in own])
+    matrix = point.factor @ point.factor.T + columns @ columns.T
+    expected = stats.multivariate_normal(sum(start.change for start in own), matrix).logpdf(
+        residual)
+    prior = covariance._prior(point.values)[0]
+    assert found - prior == pytest.approx(expected, abs=1e-6)
+
+
+def test_an_effect_that_is_there_has_the_best_evidence():
+    """And a pair of two that are."""
+    covariance, starts = make(3, 50)
+    covariance.add(covariance.start(0.4, 2.0))
+    rng = np.random.default_rng(2)
+    residual = (starts[2].columns[:, 0] - 0.7 * starts[7].columns[:, 0]
+                + 0.002 * rng.standard_normal(150))
+    family = Linearised(covariance, residual, starts)
+    pairs = family.pairs()
+    assert max(pairs, key=lambda names: pairs[names][0]) == tuple(sorted((NAMES[2], NAMES[7])))
+    singles = family.singles()
+    assert max(singles, key=lambda names: singles[names][0])[0] in (NAMES[2], NAMES[7])
+
+
+@pytest.mark.parametrize('trials, rows, rho', [(4, 60, 0.0), (4, 60, 0.9), (4, 60, 0.98),
+                                               (1, 60, 0.9), (1, 60, 0.98)])
+def test_autocorrelated_noise_is_seldom_taken_for_an_effect(trials, rows, rho):
+    """Five in a hundred are asked for; of 60 at most 8 with a probability of 99 %."""
+    rng = np.random.default_rng(7)
+    rejected = 0
+    for draw in range(60):
+        covariance, starts = make(trials, rows, seed=draw)
+        residual = autoregressive(rng, trials, rows, rho)
+        for drift, noise in ((0.1, 0.3), (1.5, 0.3), (6.0, 0.3)):
+            covariance.add(covariance.start(drift, noise))
+        point = covariance.add(covariance.fit(residual))
+        values = Linearised(covariance, residual, starts).p_values(point, rng, 100)
+        rejected += min(values.values()) <= 0.05
+    assert rejected <= 8, rejected
+
+
+def test_a_p_value_is_never_zero():
+    """It says how many draws there were."""
+    covariance, starts = make(2, 60)
+    point = covariance.add(covariance.start(0.4, 1.0))
+    residual = 5.0 * starts[3].columns[:, 0]
+    values = Linearised(covariance, residual, starts).p_values(
+        point, np.random.default_rng(0), 50)
+    assert min(values.values()) == pytest.approx(1.0 / 51.0)
