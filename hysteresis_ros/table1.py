@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from hysteresis_ros.bicep import BicepGeometry
-from hysteresis_ros.diagnosis.metrics import errors
+from hysteresis_ros.measurements.metrics import errors
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.identification.baselines import (
     fit_additive, fit_embedded_line, fit_one_load, simulate)

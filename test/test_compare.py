@@ -6,9 +6,9 @@ import dataclasses
 import json
 from types import SimpleNamespace
 
-from hysteresis_ros.diagnosis.compare import bench_effects, compare, ladder
-from hysteresis_ros.diagnosis.signals import changes, signals_of
-from hysteresis_ros.diagnosis.where import (
+from hysteresis_ros.comparison.compare import bench_effects, compare, ladder
+from hysteresis_ros.comparison.signals import changes, signals_of
+from hysteresis_ros.comparison.where import (
     binned, blocks_of, correlogram, half_width, memory, number, placed)
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement

@@ -8,11 +8,11 @@ import re
 from types import SimpleNamespace
 
 from hypothesis import given, strategies
-from hysteresis_ros.diagnosis import page
-from hysteresis_ros.diagnosis.compare import compare
-from hysteresis_ros.diagnosis.compare_page import comparison_page, rendered, summary, trials
-from hysteresis_ros.diagnosis.drawing import new_figure, png, thinned
-from hysteresis_ros.diagnosis.plots import along, figures
+from hysteresis_ros.report import page
+from hysteresis_ros.comparison.compare import compare
+from hysteresis_ros.report.comparison_page import comparison_page, rendered, summary, trials
+from hysteresis_ros.report.drawing import new_figure, png, thinned
+from hysteresis_ros.report.plots import along, figures
 from hysteresis_ros.measurements import Measurement
 import numpy as np
 import pytest

@@ -4,7 +4,7 @@
 
 from hypothesis import given, strategies
 from hypothesis.extra.numpy import arrays
-from hysteresis_ros.diagnosis.metrics import (
+from hysteresis_ros.measurements.metrics import (
     errors, noise_floor, repeat_noise, resolution_noise, sample_noise)
 from hysteresis_ros.measurements import Measurement
 import numpy as np

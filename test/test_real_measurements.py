@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from hysteresis_ros.diagnosis.compare import compare
+from hysteresis_ros.comparison.compare import compare
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.identification.bench import identify

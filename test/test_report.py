@@ -10,8 +10,8 @@ import pytest
 
 from hysteresis_ros.diagnosis.diagnose import Diagnosis
 from hysteresis_ros.diagnosis.extend import extend
-from hysteresis_ros.diagnosis.report import write_diagnosis, write_extension
-from hysteresis_ros.diagnosis.words import parameters_in_words, verdict_in_words
+from hysteresis_ros.report.diagnosis_page import write_diagnosis, write_extension
+from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
 from hysteresis_ros.measurements import Measurement
 
 NASTY = '<script>alert(1)</script>&run.csv'

@@ -31,7 +31,7 @@ def add_parser(subparsers):
 
 def run(args):
     """Do it."""
-    from hysteresis_ros.diagnosis.compare import compare
+    from hysteresis_ros.comparison.compare import compare
     from hysteresis_ros.model import MuscleModel
 
     steps = Steps()
@@ -54,8 +54,8 @@ def run(args):
 
 def draw(args, comparison, steps):
     """Write the page and the pictures that were asked for."""
-    from hysteresis_ros.diagnosis.compare_page import comparison_page, rendered
-    from hysteresis_ros.diagnosis.plots import figures
+    from hysteresis_ros.report.comparison_page import comparison_page, rendered
+    from hysteresis_ros.report.plots import figures
 
     steps('drawing')
     pictures = rendered(figures(comparison))

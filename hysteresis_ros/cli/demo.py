@@ -91,7 +91,7 @@ def pace_of(args, hidden) -> Pace:
 
 def run(args):
     """Do it."""
-    from hysteresis_ros.diagnosis.compare import compare
+    from hysteresis_ros.comparison.compare import compare
     from hysteresis_ros.measurements import read_measurement
 
     if args.values < 4:
@@ -237,7 +237,7 @@ PAPER = {'sinusoidal': (1.8, 0.8, 3.4, 1.7), 'random': (1.6, 1.1, 4.2, 2.9)}
 
 def table(result):
     """Return Table I's rows for the arm."""
-    from hysteresis_ros.diagnosis.compare import layout
+    from hysteresis_ros.comparison.compare import layout
 
     rows = [['arm [deg]', 'mean, model', 'std', 'mean, linear', 'std', 'paper: mean', 'std',
              'linear', 'std']]
@@ -274,7 +274,7 @@ def find_and_extend(args, folder, model, sequences, data, hidden, pace, result):
 
 def draw(path, sequences, runs, linear, again, pace):
     """Save the picture: targets and angles reached, and the errors."""
-    from hysteresis_ros.diagnosis.drawing import new_figure, png
+    from hysteresis_ros.report.drawing import new_figure, png
 
     made = new_figure(10.0, 5.6, 2, len(sequences), sharex='col')
     figure, axes = made[0], np.asarray(made[1]).reshape(2, -1)

@@ -39,18 +39,18 @@ def run(args):
                      progress=lambda items, total: progress(items, 'effects', total))
     say(args, to_text(found, measurements[-1].response))
     if args.json:
-        from hysteresis_ros.diagnosis.compare import compare
+        from hysteresis_ros.comparison.compare import compare
         where = compare(model, measurements).to_json()['where']
         write_json(args.json, {**found.to_json(), 'where': where})
     if args.report:
-        from hysteresis_ros.diagnosis.report import write_diagnosis
+        from hysteresis_ros.report.diagnosis_page import write_diagnosis
         write_diagnosis(args.report, model, measurements, found, args.model)
 
 
 def to_text(found, response):
     """Return the diagnosis for a terminal."""
-    from hysteresis_ros.diagnosis.compare import layout
-    from hysteresis_ros.diagnosis.words import parameters_in_words, verdict_in_words
+    from hysteresis_ros.comparison.compare import layout
+    from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
 
     factor, unit = UNITS[response]
     lines = [verdict_in_words(found), '']

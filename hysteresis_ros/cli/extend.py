@@ -47,13 +47,13 @@ def run(args):
     if args.json:
         write_json(args.json, extension.to_json())
     if args.report:
-        from hysteresis_ros.diagnosis.report import write_extension
+        from hysteresis_ros.report.diagnosis_page import write_extension
         write_extension(args.report, model, extension, train, test, args.output)
 
 
 def to_text(extension, response):
     """Return the gain for a terminal."""
-    from hysteresis_ros.diagnosis.words import parameters_in_words
+    from hysteresis_ros.report.words import parameters_in_words
 
     factor, unit = UNITS[response]
     lines = []

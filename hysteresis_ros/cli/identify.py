@@ -96,8 +96,8 @@ def with_effects(args, model, force, length):
 
 def report(model, found, added):
     """Return the rows of Table I and what the fits say, for a terminal."""
-    from hysteresis_ros.diagnosis.compare import layout
-    from hysteresis_ros.diagnosis.words import parameters_in_words
+    from hysteresis_ros.comparison.compare import layout
+    from hysteresis_ros.report.words import parameters_in_words
 
     rows = [['Table I', 'mean, model', 'linear', 'std, model', 'linear', 'rows']]
     for name, letter in (('force', 'F'), ('length', 'L')):

@@ -69,7 +69,7 @@ def report(result):
     str
 
     """
-    from hysteresis_ros.diagnosis.compare import layout
+    from hysteresis_ros.comparison.compare import layout
 
     methods = list(result['rows'][0]['ours'])
     lines = [f'Table I of the paper and of {len(result["seeds"])} specimens of the laboratory: '

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hysteresis_ros import __version__
-from hysteresis_ros.diagnosis.metrics import errors
+from hysteresis_ros.measurements.metrics import errors
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.baselines import fit_linear

@@ -5,9 +5,9 @@
 from dataclasses import dataclass, field
 import os
 
-from hysteresis_ros.diagnosis.metrics import Errors, errors, finite, Floor, noise_floor
-from hysteresis_ros.diagnosis.signals import signals_of
-from hysteresis_ros.diagnosis.where import blocks_of, number, regions
+from hysteresis_ros.measurements.metrics import Errors, errors, finite, Floor, noise_floor
+from hysteresis_ros.comparison.signals import signals_of
+from hysteresis_ros.comparison.where import blocks_of, number, regions
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.holds import hold_ends, mean_of_windows
 from hysteresis_ros.measurements.quantities import QUANTITIES, shown

@@ -10,7 +10,7 @@ no global state.
 import base64
 import io
 
-from hysteresis_ros.diagnosis.signals import label
+from hysteresis_ros.comparison.signals import label
 import numpy as np
 
 MOST_POINTS = 4000

@@ -3,9 +3,9 @@
 """The comparison as one HTML page."""
 
 from hysteresis_ros import __version__
-from hysteresis_ros.diagnosis import page
-from hysteresis_ros.diagnosis.drawing import png
-from hysteresis_ros.diagnosis.where import number
+from hysteresis_ros.report import page
+from hysteresis_ros.report.drawing import png
+from hysteresis_ros.comparison.where import number
 from hysteresis_ros.measurements.quantities import shown
 
 CAPTIONS = {

@@ -9,7 +9,7 @@ HTML that `page` puts together.
 
 from html import escape
 
-from hysteresis_ros.diagnosis.drawing import data_address
+from hysteresis_ros.report.drawing import data_address
 
 STYLE = """
 :root { color-scheme: light; }

@@ -6,14 +6,14 @@ import numpy as np
 
 from hysteresis_ros import __version__
 from hysteresis_ros.atomic import write_text
-from hysteresis_ros.diagnosis import page
-from hysteresis_ros.diagnosis.compare import compare
-from hysteresis_ros.diagnosis.compare_page import CAPTIONS
-from hysteresis_ros.diagnosis.drawing import new_figure, png
-from hysteresis_ros.diagnosis.plots import figures
+from hysteresis_ros.report import page
+from hysteresis_ros.comparison.compare import compare
+from hysteresis_ros.report.comparison_page import CAPTIONS
+from hysteresis_ros.report.drawing import new_figure, png
+from hysteresis_ros.report.plots import figures
 from hysteresis_ros.diagnosis.kind import problem_for
-from hysteresis_ros.diagnosis.where import number
-from hysteresis_ros.diagnosis.words import parameters_in_words, verdict_in_words
+from hysteresis_ros.comparison.where import number
+from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
 from hysteresis_ros.measurements.quantities import shown
 
 MOST_ROWS = 15

@@ -6,9 +6,9 @@ The pictures of a comparison.
 Lines differ in shape and lightness, so that grey print keeps them.
 """
 
-from hysteresis_ros.diagnosis.drawing import axis_label, new_figure, scaled, some_rows, thinned
-from hysteresis_ros.diagnosis.signals import label
-from hysteresis_ros.diagnosis.where import binned, blocks_of, correlogram
+from hysteresis_ros.report.drawing import axis_label, new_figure, scaled, some_rows, thinned
+from hysteresis_ros.comparison.signals import label
+from hysteresis_ros.comparison.where import binned, blocks_of, correlogram
 import numpy as np
 
 MEASURED = {'color': '#000000', 'linewidth': 1.3, 'linestyle': '-'}

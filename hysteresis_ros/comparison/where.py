@@ -10,8 +10,8 @@ than the residual's memory, not between rows.
 
 from typing import NamedTuple
 
-from hysteresis_ros.diagnosis.metrics import finite
-from hysteresis_ros.diagnosis.signals import label
+from hysteresis_ros.measurements.metrics import finite
+from hysteresis_ros.comparison.signals import label
 import numpy as np
 from scipy.stats import t as student
 
