@@ -16,7 +16,7 @@ from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame
 from hysteresis_ros.bridge.pwm import Pwm
-from hysteresis_ros.bridge.simulated_board import SimulatedBoard, TICK
+from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
 from hysteresis_ros.errors import BoardError, ParameterError, RangeError
 from hysteresis_ros.laboratory.plant import Plant
 import pytest

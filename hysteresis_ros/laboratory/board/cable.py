@@ -4,7 +4,7 @@
 
 import random
 
-from hysteresis_ros.bridge.simulated_board import TICK
+from hysteresis_ros.laboratory.board.simulated_board import TICK
 
 
 class Cable:

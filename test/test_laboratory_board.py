@@ -7,7 +7,7 @@ import math
 from hypothesis import given, settings, strategies as st
 from hysteresis_ros.bridge.messages import Identity, Telemetry
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame, Remark
-from hysteresis_ros.bridge.simulated_board import PERIOD, SimulatedBoard, TICK, WATCHDOG
+from hysteresis_ros.laboratory.board.simulated_board import PERIOD, SimulatedBoard, TICK, WATCHDOG
 import pytest
 
 
