@@ -16,7 +16,7 @@ import numpy as np
 from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.linkage import GEOMETRY, HIGHEST_ANGLE, LOWEST_ANGLE
-from hysteresis_ros.laboratory.muscle import Muscle
+from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.solve import RootFinder
 
 __all__ = ['Arm', 'GEOMETRY']
@@ -58,7 +58,7 @@ class Arm:
 
     def __init__(self, conditions: Conditions, seed=0):
         self.conditions = conditions
-        self.muscle = Muscle(conditions)
+        self.muscle = ParallelWires(conditions)
         self._chance = np.random.default_rng(seed)
         self.time = 0.0
         self.angle = 2.2

@@ -13,7 +13,7 @@ import numpy as np
 from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.heat import ROOM
-from hysteresis_ros.laboratory.muscle import Muscle
+from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.solve import RootFinder
 from hysteresis_ros.laboratory.wire import (
     LARGEST_TENSION, LENGTH_TOLERANCE, TYPICAL_COMPLIANCE)
@@ -39,7 +39,7 @@ class Bench:
 
     def __init__(self, conditions: Conditions, seed=0):
         self.conditions = conditions
-        self._muscle = Muscle(conditions)
+        self._muscle = ParallelWires(conditions)
         self._chance = np.random.default_rng(seed)
 
     def force_trial(self, voltages, hold: float = HOLD) -> np.ndarray:

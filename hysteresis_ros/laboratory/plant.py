@@ -5,7 +5,7 @@ One specimen of everything: its wire on the bench, and its arm.
 
 About time. Eq. 1 always holds, but how fast the wire follows is a property of the plant,
 `heat_time_constant`: 5 s by default, as in the paper, on the bench, for settled steps and for the
-simulated board. Continuous recordings of the protocol `arm-dynamic` are made with a thin wire on
+simulated board. Continuous recordings of the experiment `arm-dynamic` are made with a thin wire on
 which the heat has come and gone before the next sample, `BRISK` = 0.02 s, so that an arm without
 any hidden effect is quasi-static at 10 Hz (0.15 s already shows as a lag);
 `thermal_lag`, `heating_cooling_asymmetry` and `latent_heat` bring their own seconds along.
@@ -25,8 +25,8 @@ from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.bench import Bench, HOLD
 from hysteresis_ros.laboratory.conditions import Conditions
-from hysteresis_ros.laboratory.effects import apply_effects
 from hysteresis_ros.laboratory.heat import HeatBalance
+from hysteresis_ros.laboratory.hidden_physics import apply_effects
 from hysteresis_ros.laboratory.wire import WireMaterial
 
 # Time constants of Eq. 1 [s]: in the paper, and in continuous recordings.

@@ -32,7 +32,7 @@ import math
 from urllib.parse import parse_qsl, urlsplit
 
 from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.laboratory.effects import EFFECTS
+from hysteresis_ros.laboratory.hidden_physics import EFFECTS
 from hysteresis_ros.laboratory.plant import Plant
 
 SCHEME = 'sim'

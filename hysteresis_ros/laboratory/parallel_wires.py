@@ -14,7 +14,7 @@ HELD = 6e-3
 FADING = 1.0
 
 
-class Muscle:
+class ParallelWires:
     """
     Parallel wires; those that are alike are computed once.
 

@@ -8,10 +8,10 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import EFFECTS, hidden_effects, Plant, unlisted_effects
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Air, Conditions
-from hysteresis_ros.laboratory.effects import apply_effects
 from hysteresis_ros.laboratory.heat import GAIN, HeatBalance
+from hysteresis_ros.laboratory.hidden_physics import apply_effects
 from hysteresis_ros.laboratory.linkage import Linkage
-from hysteresis_ros.laboratory.muscle import Muscle
+from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.plant import BRISK
 from hysteresis_ros.laboratory.sequences import repeated_loop, steps_of_all_speeds
 from hysteresis_ros.laboratory.unlisted import Events
@@ -212,7 +212,7 @@ def test_creep_follows_the_logarithm_of_time():
 def test_creep_of_a_full_transformation():
     """After 57 s it is the share c of the length times ln(1 + 57 / 3), as the wires contract."""
     conditions = Conditions(creep=0.004, creep_time=3.0)
-    muscle = Muscle(conditions)
+    muscle = ParallelWires(conditions)
     muscle.age(6.0, 0.1)
     muscle.commit(120.0, [3.0])
     muscle.age(6.0, 57.0)

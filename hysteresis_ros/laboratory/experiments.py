@@ -93,19 +93,19 @@ def _stack(trials: list[Table], columns: list[str]) -> Table:
     return {name: np.concatenate([table[name] for table in trials]) for name in columns}
 
 
-PROTOCOLS = {'bench': bench_tables, 'arm-steps': arm_step_tables,
-             'arm-dynamic': arm_dynamic_tables}
+EXPERIMENTS = {'bench': bench_tables, 'arm-steps': arm_step_tables,
+               'arm-dynamic': arm_dynamic_tables}
 
 
-def protocol_tables(name: str, effects: Mapping[str, float] | None = None,
-                    seed: int = 0) -> dict[str, Table]:
+def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
+                      seed: int = 0) -> dict[str, Table]:
     """
-    Carry a protocol out and return its tables.
+    Carry an experiment out and return its tables.
 
     Parameters
     ----------
     name : str
-        A key of `PROTOCOLS`.
+        A key of `EXPERIMENTS`.
     effects : mapping of str to float
         Strengths of hidden effects. On the bench only those of the wire itself act.
     seed : int
@@ -119,23 +119,23 @@ def protocol_tables(name: str, effects: Mapping[str, float] | None = None,
     Raises
     ------
     ParameterError
-        For a protocol or an effect that does not exist.
+        For an experiment or an effect that does not exist.
     """
-    if name not in PROTOCOLS:
+    if name not in EXPERIMENTS:
         raise ParameterError(f'laboratory: there is no protocol {name!r}; '
-                             f'there are {", ".join(PROTOCOLS)}')
-    return PROTOCOLS[name](effects or {}, seed)
+                             f'there are {", ".join(EXPERIMENTS)}')
+    return EXPERIMENTS[name](effects or {}, seed)
 
 
-def write_protocol(name: str, directory, effects: Mapping[str, float] | None = None,
-                   seed: int = 0) -> list[Path]:
+def write_experiment(name: str, directory, effects: Mapping[str, float] | None = None,
+                     seed: int = 0) -> list[Path]:
     """
-    Carry a protocol out and write its tables.
+    Carry an experiment out and write its tables.
 
     Parameters
     ----------
     name, effects, seed
-        As for `protocol_tables`.
+        As for `experiment_tables`.
     directory : str or Path
         Made where it is missing.
 
@@ -147,11 +147,11 @@ def write_protocol(name: str, directory, effects: Mapping[str, float] | None = N
     Raises
     ------
     ParameterError
-        For a protocol or an effect that does not exist.
+        For an experiment or an effect that does not exist.
     OSError
         If a file cannot be written.
     """
-    tables = protocol_tables(name, effects, seed)
+    tables = experiment_tables(name, effects, seed)
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     for file, columns in tables.items():
