@@ -51,7 +51,7 @@ def test_url_without_keys_is_a_perfect_arm_at_real_time():
     assert parse_url('SIM://Bicep/') == Simulation()
 
 
-def test_every_key():
+def test_url_with_every_key_is_read():
     simulation = parse_url(
         'sim://bicep?speed=60&seed=3&recording=2&recording_time=100&time_constant=2&supply=24'
         '&drop=0.01&garbage=0.1&brownout=5&unplug_after=1&unplug_for=2&silent_after=3'
@@ -95,7 +95,7 @@ def test_perfect_cable_delivers_every_byte():
     assert wire.time == pytest.approx(2.0)
 
 
-def test_drop_loses_about_as_much_as_asked_in_both_directions():
+def test_drop_loses_the_given_share_in_both_directions():
     wire = cable(drop=0.1)
     for _ in range(1000):
         wire.tick()
@@ -137,7 +137,7 @@ def test_silence_begins_and_ends():
     assert not [time for time in times if 1000 < time < 3000]
 
 
-def test_deaf_board_lets_its_watchdog_bite():
+def test_watchdog_of_a_deaf_board_switches_off():
     wire = cable(deaf_after=1.0)
     wire.write(encode('enable', 1))
     for _ in range(3000 // TICK):
@@ -146,7 +146,7 @@ def test_deaf_board_lets_its_watchdog_bite():
     assert wire.board.duty == 0.0 and 'watchdog' in wire.board.faults
 
 
-def test_pulled_cable_takes_the_power_with_it():
+def test_unplugged_board_loses_its_power():
     wire = cable(unplug_after=1.0, unplug_for=1.0)
     wire.write(encode('enable', 1))
     for _ in range(1000 // TICK + 1):

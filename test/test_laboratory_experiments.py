@@ -98,7 +98,7 @@ def test_same_seed_same_tables(name):
         assert np.any(tables[0]['train.csv']['voltage'] != tables[0]['test.csv']['voltage'])
 
 
-def test_the_files_do_not_tell(tmp_path):
+def test_files_do_not_name_the_hidden_effects(tmp_path):
     """Neither names nor headers nor the drive say which effect is hidden."""
     texts = []
     for effects in ({}, {'payload_error': 1.0}):

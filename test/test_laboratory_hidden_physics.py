@@ -85,22 +85,22 @@ def test_signed_effects_turn_round(name):
 def test_supply_sag_is_ohms_law():
     """Board and wire share the voltage as their resistances."""
     conditions = Conditions(lead_resistance=2.0)
-    assert conditions.heating_square(5.0, 0.3) == pytest.approx(16.0)
+    assert conditions.drive_squared(5.0, 0.3) == pytest.approx(16.0)
 
 
 def test_dead_zone():
     """Nothing below it, all of the range above it."""
     conditions = Conditions(dead_voltage=1.0)
-    assert conditions.heating_square(1.0, 0.0) == 0.0
-    assert conditions.heating_square(6.0, 0.0) == pytest.approx(36.0)
-    assert conditions.heating_square(3.5, 0.0) == pytest.approx(9.0)
+    assert conditions.drive_squared(1.0, 0.0) == 0.0
+    assert conditions.drive_squared(6.0, 0.0) == pytest.approx(36.0)
+    assert conditions.drive_squared(3.5, 0.0) == pytest.approx(9.0)
 
 
 def test_resistance_depends_on_the_phase():
     """The more resistance the martensite has, the less the same voltage heats it."""
     conditions = Conditions(resistance_growth=0.25)
-    assert conditions.heating_square(4.0, 1.0) == pytest.approx(16.0 / 1.25)
-    assert conditions.heating_square(4.0, 0.0) == pytest.approx(16.0)
+    assert conditions.drive_squared(4.0, 1.0) == pytest.approx(16.0 / 1.25)
+    assert conditions.drive_squared(4.0, 0.0) == pytest.approx(16.0)
     strong = shift('resistance_change', [6.0, MIDDLE])
     assert abs(strong[0]) < 0.2 < abs(strong[1])
 

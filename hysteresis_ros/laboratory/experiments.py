@@ -37,15 +37,15 @@ Table = dict[str, np.ndarray]
 def bench_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
     """Return the tables of the bench, by file name."""
     plant = Plant(seed, effects)
-    chance = np.random.default_rng([seed, 21])
+    rng = np.random.default_rng([seed, 21])
     oscillation = sequences.damped_oscillation()
     force, length = [], []
-    for voltage in (oscillation, sequences.random_steps(FORCE_STEPS, chance)):
+    for voltage in (oscillation, sequences.random_steps(FORCE_STEPS, rng)):
         force.append({'step': np.arange(len(voltage)), 'voltage': voltage,
                       'force': plant.force_trial(voltage)})
     for random in (False, True):
         for load in LOADS:
-            voltage = sequences.random_steps(LENGTH_STEPS, chance) if random else oscillation
+            voltage = sequences.random_steps(LENGTH_STEPS, rng) if random else oscillation
             length.append({'step': np.arange(len(voltage)), 'voltage': voltage,
                            'force': np.full(len(voltage), load),
                            'length': plant.length_trial(voltage, load)})
@@ -59,10 +59,10 @@ def arm_step_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]
              sequences.up_and_down)
 
     def record(recording):
-        chance = np.random.default_rng([seed, recording, 22])
+        rng = np.random.default_rng([seed, recording, 22])
         plant = Plant(seed, effects, recording=recording,
                       recording_time=HOLD * ARM_STEPS * len(kinds))
-        return [plant.arm_trial(kind(ARM_STEPS, chance)) for kind in kinds]
+        return [plant.arm_trial(kind(ARM_STEPS, rng)) for kind in kinds]
     return _recordings(record)
 
 
@@ -72,8 +72,8 @@ def arm_dynamic_tables(effects: Mapping[str, float], seed: int) -> dict[str, Tab
              sequences.long_holds)
 
     def record(recording):
-        chance = np.random.default_rng([seed, recording, 23])
-        runs = [kind(chance) for kind in kinds]
+        rng = np.random.default_rng([seed, recording, 23])
+        runs = [kind(rng) for kind in kinds]
         plant = Plant(seed, effects, heat_time_constant=BRISK, recording=recording,
                       recording_time=sequences.SAMPLING * sum(len(run) for run in runs))
         return [plant.arm_run(np.round(sequences.SAMPLING * np.arange(1, len(run) + 1), 3), run)

@@ -7,7 +7,7 @@ What ``sim://bicep?key=value&...`` asks for: speed, seed, faults, and physical e
 key             meaning
 =============== ===================================================================================
 speed           how much faster than the wall's clock the arm lives (0.01 to 1000; 1)
-seed            which specimen of arm and wire, and all that is left to chance (0)
+seed            which specimen of arm and wire, and all that is random (0)
 recording       which recording on that specimen: another one has other noise (0)
 recording_time  how long it takes, about, in s, for effects that are slow or rare (900)
 time_constant   of the wires' heating and cooling in s (0.05 to 100; 5 as in the paper)
