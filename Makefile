@@ -18,12 +18,12 @@ endif
 ROS := $(if $(filter jazzy,$(ROS_DISTRO)),$(shell \
 	env -u _ROS_WHEELS_BOOTSTRAP_COMPLETE $(PYTHON) -c 'import rclpy; print("sourced")' 2>/dev/null))
 ifeq ($(ROS),sourced)
-EXTRAS := test,bags
+EXTRAS := test,docs,bags
 else
 ifeq ($(ROS_DISTRO),jazzy)
 $(info ROS 2 Jazzy is sourced, but $(PYTHON) cannot import rclpy: its wheels are used.)
 endif
-EXTRAS := test,bags,ros
+EXTRAS := test,docs,bags,ros
 unexport PYTHONPATH AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH
 endif
 
@@ -50,13 +50,14 @@ IN_WORKSPACE := export PATH="$$PWD/$(VENV)/bin:$$PATH"; \
 	. ./$(WORKSPACE)/install/local_setup.sh; \
 	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help build demo test benchmark hidden clean force
+.PHONY: help build demo test benchmark hidden docs clean force
 
 help:
 	@echo 'make demo       the whole system on the simulated arm: identify, drive, record, compare'
 	@echo 'make test       all tests and linters'
 	@echo 'make benchmark  speed and accuracy, into benchmark.json'
 	@echo 'make hidden     the hidden-effect grid, into hidden.json'
+	@echo 'make docs       the pages of docs/ with the programming interface, into build/docs'
 	@echo 'make build      the workspace alone; then: . install/local_setup.sh'
 	@echo 'make clean      remove all that make made'
 	@echo 'PYTHON= chooses the interpreter, CONSTRAINTS= a pip constraints file,'
@@ -98,6 +99,11 @@ benchmark: build
 
 hidden: build
 	@$(IN_WORKSPACE) $(VENV)/bin/python tools/hidden.py --page docs/results.md $(HIDDEN_ARGS) hidden.json
+
+docs: $(VENV)/made
+	@$(VENV)/bin/python -m sphinx -q -W --keep-going -b html \
+		-d $(WORKSPACE)/build/doctrees docs $(WORKSPACE)/build/docs
+	@echo '$(WORKSPACE)/build/docs/index.html'
 
 clean:
 	rm -rf .venv* .workspace* build install log dist demo *.egg-info

@@ -87,6 +87,9 @@ setup(
     extras_require={
         # Reads and writes rosbag2 folders where rosbag2_py is not installed.
         'bags': ['rosbags>=0.10'],
+        # Builds docs/ as HTML: numpydoc reads the docstrings, MyST the pages in Markdown. The
+        # lower bounds are what Ubuntu 24.04 ships.
+        'docs': ['sphinx>=7.2', 'numpydoc>=1.6', 'myst-parser>=2.0'],
         # Spreads a diagnosis over a laboratory's machines.
         'cluster': ['dask[distributed]>=2024.1'],
         # ROS 2 Jazzy as wheels, for a machine that has no ROS.

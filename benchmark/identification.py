@@ -14,7 +14,7 @@ import numpy as np
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
 from hysteresis_ros.identification.operators import smoothness
-from hysteresis_ros.laboratory.protocols import LOADS, bench_tables
+from hysteresis_ros.laboratory.experiments import LOADS, bench_tables
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.operators import cell_areas, signed_areas
 from hysteresis_ros.table1 import FORCE_TRIALS, LENGTH_TRIALS

@@ -20,9 +20,9 @@ from hysteresis_ros.identification.baselines import (
     fit_additive, fit_embedded_line, fit_one_load, simulate)
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.laboratory.experiments import LOADS, bench_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import Plant
-from hysteresis_ros.laboratory.protocols import LOADS, bench_tables
 from hysteresis_ros.measurements import Measurement
 
 ROWS = ('F-q identification', 'F-q verification', 'F-q compensation', 'L-q identification',

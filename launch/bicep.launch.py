@@ -1,7 +1,7 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Start the arm: board, compensator, geometry, and the model beside it.
+Start the arm: board, compensator, geometry, and the model that runs along.
 
 Alone it starts the simulated arm; ``port:=/dev/ttyUSB0`` the real one. When board or compensator
 end, everything ends: neither can come back alone, because the muscle's memory and the model's

@@ -16,6 +16,8 @@ ROS = {'rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', '
 # rosbag2_py reads what rosbags does not know, and is asked for only then.
 ROS_OUTSIDE_NODES = {'hysteresis_ros.measurements.bag_rosbag2'}
 MODEL = {'operators', 'effects', 'model', 'identification', 'bicep'}
+# What the simulated board and its host have to agree on: pure functions of bytes.
+CODEC = ('hysteresis_ros.bridge.protocol', 'hysteresis_ros.bridge.messages')
 UNSAFE_MODULES = {'pickle', 'cPickle', 'cloudpickle', 'dill', 'marshal', 'shelve'}
 UNSAFE_CALLS = {'eval', 'exec', 'os.system', 'os.popen', 'joblib.load', 'joblib.dump',
                 'yaml.load', 'yaml.load_all', 'yaml.unsafe_load', 'yaml.unsafe_load_all',
@@ -85,6 +87,38 @@ def test_the_laboratory_does_not_know_the_model(root):
         root,
         lambda module: not module.startswith('hysteresis_ros.laboratory'),
         lambda name: name.split('.')[0] == 'hysteresis_ros' and name.split('.')[1] in MODEL) == []
+
+
+def test_the_simulated_board_shares_only_the_codec_with_the_bridge(root):
+    """The laboratory's board is the other end of the cable, not a part of the host."""
+    assert offenders(
+        root,
+        lambda module: not module.startswith('hysteresis_ros.laboratory'),
+        lambda name: name.startswith(('hysteresis_ros.bridge', 'hysteresis_ros.nodes'))
+        and not name.startswith(CODEC)) == []
+    assert offenders(
+        root,
+        lambda module: (not module.startswith('hysteresis_ros.laboratory')
+                        or module.startswith('hysteresis_ros.laboratory.board')),
+        lambda name: name.startswith('hysteresis_ros.bridge')) == []
+
+
+def test_only_the_port_handler_brings_the_laboratory_into_the_bridge(root):
+    """A host on a real board needs no virtual laboratory; `sim://` is what asks for it."""
+    assert offenders(
+        root,
+        lambda module: (not module.startswith('hysteresis_ros.bridge')
+                        or module.startswith('hysteresis_ros.bridge.urlhandlers')),
+        lambda name: name.startswith('hysteresis_ros.laboratory')
+        and name != 'hysteresis_ros.laboratory.board.url.check_url') == []
+
+
+def test_the_codec_is_pure(root):
+    """The frames of the board's protocol are bytes and numbers, for the host and the board."""
+    assert offenders(
+        root, lambda module: module not in CODEC,
+        lambda name: (name.split('.')[0] not in sys.stdlib_module_names
+                      and not name.startswith((*CODEC, 'hysteresis_ros.errors')))) == []
 
 
 def test_the_model_does_not_know_the_laboratory(root):

@@ -9,8 +9,8 @@ from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.baselines import (
     fit_additive, fit_embedded_line, fit_linear, fit_one_load, simulate)
 from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.laboratory.plant import Plant
-from hysteresis_ros.laboratory.protocols import bench_tables
 from hysteresis_ros.laboratory.sequences import damped_oscillation
 from hysteresis_ros.measurements import Measurement
 

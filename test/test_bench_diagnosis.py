@@ -13,8 +13,8 @@ from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.laboratory.experiments import experiment_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
-from hysteresis_ros.laboratory.protocols import protocol_tables
 from hysteresis_ros.measurements import Measurement
 
 ROWS, STEP = 120, 2.0
@@ -163,7 +163,7 @@ def test_an_extended_model_says_what_was_fitted():
 
 def test_the_elasticity_of_the_wire_is_added_to_what_the_bench_proves():
     """Constant loads cannot prove it; on an arm it is needed."""
-    tables = protocol_tables('bench', {}, 3)
+    tables = experiment_tables('bench', {}, 3)
     force, length = (Measurement.from_columns(tables[name]) for name in
                      ('force.csv', 'length.csv'))
     trials = {'length_trials': range(4), 'force_trials': [0]}
@@ -183,7 +183,7 @@ def test_a_load_without_a_force_table_gets_the_operator_that_predicts_better():
     loads = np.repeat([2.0, 4.0, 6.0, 8.0], ROWS)
     rubber = Measurement.from_columns({
         **rubber, 'force': loads, 'length': rubber['length'] + 1e-4 * loads})
-    wire = Measurement.from_columns(protocol_tables('bench', {}, 3)['length.csv'])
+    wire = Measurement.from_columns(experiment_tables('bench', {}, 3)['length.csv'])
     for measurement, kind in ((rubber, 'preisach'), (wire, 'two-stage')):
         found = identify(measurement, levels=(10, 12))
         assert found.model.kind == kind

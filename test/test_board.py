@@ -16,7 +16,7 @@ from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame
 from hysteresis_ros.bridge.pwm import Pwm
-from hysteresis_ros.bridge.simulated_board import SimulatedBoard, TICK
+from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
 from hysteresis_ros.errors import BoardError, ParameterError, RangeError
 from hysteresis_ros.laboratory.plant import Plant
 import pytest
@@ -189,7 +189,7 @@ def test_a_port_that_is_closed_meanwhile_is_lost():
             link.read()
 
 
-def test_first_word_on_the_way_out_is_zero():
+def test_stop_writes_zero_and_disable_before_closing():
     far = BoardOnTerminal()
     with Terminal(far) as terminal:
         with Board(terminal.port, timeouts=QUICK) as board:
@@ -275,14 +275,14 @@ def test_device_that_is_to_be_found_by_its_name(boards):
     assert 'no ports found' in problem(boards('hwgrep://a_board_that_nobody_has'))
 
 
-def test_port_that_is_no_port(boards, tmp_path):
+def test_plain_file_as_port_is_reported(boards, tmp_path):
     path = tmp_path / 'file'
     path.write_text('x')
     assert 'cannot be opened' in problem(boards(str(path)))
 
 
 @pytest.mark.parametrize('port', ['foo://x', 'sim://leg', 'sim://bicep?sped=2'])
-def test_port_that_cannot_be_is_refused_at_once(port):
+def test_malformed_port_is_refused_at_once(port):
     with pytest.raises(ParameterError, match=port.split(':')[0]):
         Board(port)
 
@@ -354,7 +354,7 @@ def test_board_that_goes_silent_and_comes_back():
         until(lambda: far.board.duty > 0.0, 'the voltage')
 
 
-def test_host_that_goes_silent(boards, monkeypatch):
+def test_board_watchdog_switches_off_when_the_host_is_silent(boards, monkeypatch):
     far = BoardOnTerminal()
     with Terminal(far) as terminal:
         board = online(boards(terminal.port))
@@ -389,7 +389,7 @@ def test_board_that_starts_anew_is_greeted_and_enabled_again():
         assert 'started anew' in after.encoder_fault
         assert after.angle == pytest.approx(before.angle, abs=0.01)
         assert after.time > before.time
-        board.forgive()
+        board.clear_fault()
         until(lambda: board.status.sample.encoder_fault == '', 'the doubt to go')
 
 
@@ -453,7 +453,7 @@ def test_counter_of_16_bits_is_what_the_board_says(boards):
         assert board.status.sample.encoder_fault == ''
 
 
-def test_error_of_a_listener_switches_off_and_goes_on():
+def test_error_in_the_sample_callback_switches_off_and_reconnects():
     def listen(sample):
         samples.append(sample)
         if len(samples) == 3:
@@ -467,7 +467,7 @@ def test_error_of_a_listener_switches_off_and_goes_on():
         until(lambda: len(samples) > 5, 'more samples')
 
 
-def test_nobody_waits_for_a_port_that_hangs(monkeypatch):
+def test_hanging_port_blocks_no_caller(monkeypatch):
     hangs = threading.Event()
     monkeypatch.setattr(BoardLink, 'open', lambda link: hangs.wait(DEADLINE) and None)
     board = Board('sim://bicep', timeouts=QUICK)
@@ -481,21 +481,21 @@ def test_nobody_waits_for_a_port_that_hangs(monkeypatch):
     board.stop()
 
 
-def test_stopping_what_never_started():
+def test_stop_before_start_does_nothing():
     Board('sim://bicep').stop()
 
 
-def test_stamps_of_time_slow_down_with_the_slower_clock(boards):
+def test_timeouts_count_by_the_slower_clock(boards):
     board = online(boards('sim://bicep?speed=0.5'))
     assert board.speed == 0.5 and board.slowness == 2.0
 
 
-def test_encoder_belongs_to_the_board(boards):
+def test_angle_is_read_with_the_given_encoder(boards):
     board = online(boards('sim://bicep', encoder=Encoder(direction=-1, zero=4.0)))
     assert board.status.sample.angle == pytest.approx(4.0 - Plant(0).arm.angle, abs=2e-3)
 
 
-def test_supply_is_averaged_but_a_step_is_taken_at_once():
+def test_supply_is_averaged_but_a_jump_is_taken_at_once():
     board = Board('sim://bicep')
     for supply in (12.0, 12.1, 11.9, 12.2):
         board._smooth(supply)

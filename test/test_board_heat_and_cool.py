@@ -34,7 +34,7 @@ def test_waits_until_the_arm_is_still():
     assert time == pytest.approx(105.0, abs=0.5)
 
 
-def test_gives_up_on_an_arm_that_never_rests():
+def test_gives_up_on_an_arm_that_never_stops_moving():
     with pytest.raises(BoardError, match='still moves'):
         run(HeatAndCool(6.0, 30.0, 60.0), angle=lambda time: time)
 
@@ -61,7 +61,7 @@ def test_gives_up_on_a_board_that_does_not_stop():
         run(HeatAndCool(6.0, 30.0, 60.0), apply=lambda voltage: 6.0)
 
 
-def test_says_where_it_is():
+def test_progress_names_phase_and_seconds():
     cycle = HeatAndCool(6.0, 30.0, 60.0)
     cycle.update(0.0, 0.0, 0.0)
     assert cycle.update(12.0, 0.0, 6.0).progress == 'heating, 12 of 30 s'

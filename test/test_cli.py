@@ -12,7 +12,7 @@ import sys
 
 from hysteresis_ros.cli.common import numbers, one_line, Steps
 from hysteresis_ros.cli.main import build_parser, COMMANDS, main
-from hysteresis_ros.laboratory.protocols import write_protocol
+from hysteresis_ros.laboratory.experiments import write_experiment
 from hysteresis_ros.measurements import read_measurement, write_csv
 from hysteresis_ros.model import MuscleModel
 import numpy as np
@@ -25,7 +25,7 @@ DATA = Path(__file__).parents[2] / 'shared' / 'data'
 def bench(tmp_path_factory):
     """Return a folder with bench tables, geometry and the model identified from them."""
     folder = tmp_path_factory.mktemp('bench')
-    write_protocol('bench', folder, seed=5)
+    write_experiment('bench', folder, seed=5)
     assert main(['identify', '--force', f'{folder}/force.csv', '--length', f'{folder}/length.csv',
                  '--force-trials', '0', '--length-trials', '0-3', '--geometry',
                  f'{folder}/geometry.yaml', '-o', f'{folder}/model.yaml', '--json',

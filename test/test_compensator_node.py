@@ -315,7 +315,7 @@ def test_feedback_takes_out_what_the_model_does_not_know(graph):
     assert values['references received'] == values['setpoints published'] == '1'
 
 
-def test_feedback_rests_while_the_muscle_is_at_its_limit(graph):
+def test_feedback_waits_while_the_muscle_is_saturated(graph):
     """Already at the largest voltage, so asking for more would only wind the integral up."""
     muscle = Muscle(graph, feedback=True, feedback_delay=0.0, republish_period=0.0,
                     maximum_voltage=5.0)
@@ -345,17 +345,17 @@ def test_target_angle_is_recovered_from_the_reference():
 def test_feedback_integral():
     """Rate, dead band, limit, the moving arm, and time that stands still or jumps."""
     feedback = AngleFeedback(gain=0.1, limit=0.05, rest_speed=0.01, dead_band=0.002, period=1.0)
-    assert feedback.step(10.0, 1.0, 1.1) == 0.0
-    assert feedback.step(11.0, 1.0, 1.1) == pytest.approx(0.01)
-    assert feedback.step(11.5, 1.0, 1.1) == pytest.approx(0.01)
-    assert feedback.step(13.0, 1.0, 1.1) == pytest.approx(0.03)
-    assert feedback.step(14.0, 1.02, 1.1) == pytest.approx(0.03)     # on its way
-    assert feedback.step(15.0, 1.025, 1.1) == pytest.approx(0.0375)
-    assert feedback.step(16.0, math.nan, 1.1) == pytest.approx(0.0375)
-    assert feedback.step(17.0, 1.025, 1.026) == pytest.approx(0.0375)   # dead band
-    assert feedback.step(900.0, 1.025, 1.1) == 0.05
-    assert feedback.step(2.0, 1.025, 1.1) == 0.05      # clock set back
-    assert feedback.step(3.0, 1.025, 0.925) == pytest.approx(0.04)
+    assert feedback.update(10.0, 1.0, 1.1) == 0.0
+    assert feedback.update(11.0, 1.0, 1.1) == pytest.approx(0.01)
+    assert feedback.update(11.5, 1.0, 1.1) == pytest.approx(0.01)
+    assert feedback.update(13.0, 1.0, 1.1) == pytest.approx(0.03)
+    assert feedback.update(14.0, 1.02, 1.1) == pytest.approx(0.03)     # on its way
+    assert feedback.update(15.0, 1.025, 1.1) == pytest.approx(0.0375)
+    assert feedback.update(16.0, math.nan, 1.1) == pytest.approx(0.0375)
+    assert feedback.update(17.0, 1.025, 1.026) == pytest.approx(0.0375)   # dead band
+    assert feedback.update(900.0, 1.025, 1.1) == 0.05
+    assert feedback.update(2.0, 1.025, 1.1) == 0.05      # clock set back
+    assert feedback.update(3.0, 1.025, 0.925) == pytest.approx(0.04)
     feedback.reset()
     assert feedback.correction == 0.0
 
@@ -363,12 +363,12 @@ def test_feedback_integral():
 def test_feedback_waits_after_a_new_target():
     """Samples from before the arm has set out say nothing; what was corrected stays."""
     feedback = AngleFeedback(gain=0.1, limit=1.0, rest_speed=0.01, period=1.0, delay=5.0)
-    feedback.step(0.0, 1.0, 1.1)
-    assert feedback.step(1.0, 1.0, 1.1) == pytest.approx(0.01)
+    feedback.update(0.0, 1.0, 1.1)
+    assert feedback.update(1.0, 1.0, 1.1) == pytest.approx(0.01)
     feedback.begin(1.0)
     for second in (2.0, 4.0, 5.9, 6.0):
-        assert feedback.step(second, 1.0, 1.5) == pytest.approx(0.01)
-    assert feedback.step(7.0, 1.0, 1.5) == pytest.approx(0.06)
+        assert feedback.update(second, 1.0, 1.5) == pytest.approx(0.01)
+    assert feedback.update(7.0, 1.0, 1.5) == pytest.approx(0.06)
 
 
 @pytest.mark.parametrize('saturated, error, change', [
@@ -377,5 +377,5 @@ def test_feedback_waits_after_a_new_target():
 def test_feedback_does_not_wind_up(saturated, error, change):
     """At a limit the integral moves only away from it."""
     feedback = AngleFeedback(gain=0.1, limit=1.0, rest_speed=0.01, dead_band=0.002, period=1.0)
-    feedback.step(0.0, 1.0, 1.0 + error)
-    assert feedback.step(1.0, 1.0, 1.0 + error, saturated) == pytest.approx(change)
+    feedback.update(0.0, 1.0, 1.0 + error)
+    assert feedback.update(1.0, 1.0, 1.0 + error, saturated) == pytest.approx(change)

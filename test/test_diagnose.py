@@ -17,8 +17,8 @@ from hysteresis_ros.diagnosis.extend import extend, rmse
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.laboratory.experiments import experiment_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
-from hysteresis_ros.laboratory.protocols import protocol_tables
 from hysteresis_ros.measurements import Measurement
 
 SEED = 11
@@ -31,7 +31,7 @@ RIVALS = ('thermal_lag', 'airflow', 'encoder_offset', 'latency')
 @pytest.fixture(scope='module')
 def model():
     """Return the model of a bench on which nothing is hidden."""
-    tables = protocol_tables('bench', {}, SEED)
+    tables = experiment_tables('bench', {}, SEED)
     force, length = (Measurement.from_columns(tables[name], source=name)
                      for name in ('force.csv', 'length.csv'))
     trials = {'length_trials': range(4), 'force_trials': [0]}
@@ -45,7 +45,7 @@ def model():
 
 def recordings(effects, protocol='arm-steps', trials=(0, 1), every=1):
     """Return some trials of the recording to diagnose, and the whole one that nothing has seen."""
-    tables = protocol_tables(protocol, effects, SEED)
+    tables = experiment_tables(protocol, effects, SEED)
     train, test = (Measurement.from_columns(
         {column: values[::every] for column, values in tables[name].items()}, source=name)
         for name in ('train.csv', 'test.csv'))

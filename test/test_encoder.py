@@ -74,7 +74,7 @@ def test_window_shorter_than_the_period_uses_two_samples():
     assert encoder.update(0.1, 10).velocity == pytest.approx(10 * COUNT / 0.1)
 
 
-def test_one_wild_sample_is_not_believed():
+def test_single_outlier_is_rejected():
     encoder = Encoder(maximum_speed=10.0)
     encoder.update(0.0, 100)
     wild = encoder.update(0.1, 5000)
@@ -84,7 +84,7 @@ def test_one_wild_sample_is_not_believed():
     assert back.fresh and back.fault == '' and back.angle == pytest.approx(110 * COUNT)
 
 
-def test_a_jump_that_stays_is_taken_but_never_hidden():
+def test_lasting_jump_is_accepted_as_a_standing_fault():
     encoder = Encoder(maximum_speed=10.0)
     encoder.update(0.0, 100)
     encoder.update(0.1, 5000)
@@ -92,11 +92,11 @@ def test_a_jump_that_stays_is_taken_but_never_hidden():
     assert reading.fresh and reading.angle == pytest.approx(5010 * COUNT)
     assert reading.velocity == 0.0
     assert 'stayed there' in encoder.update(0.3, 5010).fault
-    encoder.forgive()
+    encoder.clear_fault()
     assert encoder.update(0.4, 5010).fault == ''
 
 
-def test_two_wild_samples_that_differ_are_both_not_believed():
+def test_two_different_outliers_are_both_rejected():
     encoder = Encoder(maximum_speed=10.0)
     encoder.update(10.0, 100)
     encoder.update(10.1, 5000)
@@ -139,7 +139,7 @@ def test_index_checks_for_lost_counts():
     assert reading.angle == pytest.approx(60 * COUNT)
 
 
-def test_index_puts_the_angle_right():
+def test_index_corrects_the_angle_when_homing():
     encoder = Encoder(index='home', index_angle=1.0)
     encoder.update(0.0, 0)
     reading = encoder.update(0.1, 60, 1, 50)
@@ -159,7 +159,7 @@ def test_angle_at_the_index_holds_whatever_the_zero():
         assert encoder.update(0.1, 50, 1, 50).angle == pytest.approx(1.0, abs=COUNT)
 
 
-def test_index_ends_the_doubt_after_a_restart():
+def test_index_clears_the_fault_after_a_restart():
     encoder = Encoder(index='home', index_angle=1.0, direction=-1)
     encoder.update(0.0, 500)
     encoder.restart()

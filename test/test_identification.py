@@ -9,7 +9,7 @@ import pytest
 
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, identify
-from hysteresis_ros.laboratory.protocols import bench_tables
+from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.operators import (
     BoucWen, Linear, Preisach, PrandtlIshlinskii, signed_areas, signed_lengths)

@@ -10,11 +10,11 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import GEOMETRY, Plant
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Air, Conditions
+from hysteresis_ros.laboratory.experiments import LOADS
 from hysteresis_ros.laboratory.grains import GrainDistribution, Grains
 from hysteresis_ros.laboratory.heat import GAIN, HeatBalance, ROOM
 from hysteresis_ros.laboratory.linkage import Linkage
 from hysteresis_ros.laboratory.plant import specimen
-from hysteresis_ros.laboratory.protocols import LOADS
 from hysteresis_ros.laboratory.sensors import (
     COUNT, counted_angle, encoder_counts, LENGTH_RESOLUTION, load_cell, position_sensor)
 from hysteresis_ros.laboratory.sequences import damped_oscillation

@@ -58,8 +58,8 @@ def begin(method, period=0.01):
 @pytest.mark.parametrize('first, second', [
     (signal.SIGINT, signal.SIGINT), (signal.SIGTERM, signal.SIGINT),
     (signal.SIGINT, signal.SIGTERM)])
-def test_a_second_signal_does_not_cut_the_end(domain_id, first, second):
-    """The last words are said, however impatient the other side is."""
+def test_second_signal_does_not_interrupt_shutdown(domain_id, first, second):
+    """`on_shutdown` writes zero, however impatient the other side is."""
     child = begin('wait')
     child.send_signal(first)
     with pytest.raises(subprocess.TimeoutExpired):
@@ -70,7 +70,7 @@ def test_a_second_signal_does_not_cut_the_end(domain_id, first, second):
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_what_has_begun_comes_to_its_end(domain_id, number):
+def test_running_callback_finishes_after_a_signal(domain_id, number):
     """No exception cuts a message in half, and none is printed."""
     child = begin('work')
     assert child.stdout.readline() == 'begun\n'
@@ -79,7 +79,7 @@ def test_what_has_begun_comes_to_its_end(domain_id, number):
     assert (child.returncode, output, errors) == (0, 'done\nzero\n', '')
 
 
-def test_a_node_that_waits_for_messages_ends_at_once(domain_id):
+def test_idle_node_ends_at_once_on_a_signal(domain_id):
     """Its executor sleeps inside DDS, and nothing else would wake it."""
     child = begin('wait', period=1000.0)
     with pytest.raises(subprocess.TimeoutExpired):
@@ -89,14 +89,14 @@ def test_a_node_that_waits_for_messages_ends_at_once(domain_id):
     assert (child.returncode, output, errors) == (0, 'zero\n', '')
 
 
-def test_an_error_that_a_user_can_mend_is_one_line(domain_id):
-    """Status 1, and the last words all the same."""
+def test_user_error_ends_the_node_with_one_line(domain_id):
+    """Status 1, and `on_shutdown` is called all the same."""
     output, errors = begin('fail').communicate(timeout=20)
     assert (output, errors) == ('zero\n', 'error: the board at /dev/x is silent\n')
 
 
-def test_a_mistake_in_the_program_keeps_its_traceback(domain_id):
-    """It is not dressed up as the user's, and the last words are said here, too."""
+def test_programming_error_keeps_its_traceback(domain_id):
+    """It is not dressed up as the user's, and `on_shutdown` is called here, too."""
     child = begin('stumble')
     output, errors = child.communicate(timeout=20)
     assert child.returncode == 1
@@ -120,7 +120,7 @@ def diagnosed(graph):
     return diagnostics, statuses
 
 
-def test_a_condition_is_published_at_once_and_again_each_second(graph, diagnosed):
+def test_condition_is_published_at_once_and_every_second(graph, diagnosed):
     """The worst level counts, every sentence is shown, the worst first."""
     diagnostics, statuses = diagnosed
     diagnostics.set('heat', WARN, 'it is hot')
@@ -143,7 +143,7 @@ def test_a_condition_is_published_at_once_and_again_each_second(graph, diagnosed
     graph.until(lambda: len(statuses) >= count + 2, 'two more by the clock')
 
 
-def test_a_condition_that_lasts_does_not_flood_topic_and_log(graph, diagnosed, capfd):
+def test_lasting_condition_does_not_flood_topic_and_log(graph, diagnosed, capfd):
     """Raised a thousand times, it is published and logged once; its sentence stays the newest."""
     diagnostics, statuses = diagnosed
     for number in range(1000):

@@ -6,7 +6,7 @@ import re
 
 from hysteresis_ros.bridge.messages import FAULTS, Identity, Telemetry
 from hysteresis_ros.bridge.protocol import Frame, MAX_LINE, parse_line, Remark, VERSION
-from hysteresis_ros.bridge.simulated_board import SimulatedBoard
+from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard
 from hysteresis_ros.laboratory.plant import Plant
 import pytest
 

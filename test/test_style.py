@@ -17,7 +17,7 @@ from catkin_pkg.package import parse_package
 from conftest import colcon
 import pytest
 
-FOLDERS = ('hysteresis_ros', 'launch', 'benchmark', 'tools', 'test')
+FOLDERS = ('hysteresis_ros', 'launch', 'benchmark', 'tools', 'test', 'docs')
 HEADER = re.compile(r'(#!.*\n)?'
                     r'# Copyright 20\d\d hysteresis_ros contributors\n'
                     r'# SPDX-License-Identifier: Apache-2\.0\n')

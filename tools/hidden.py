@@ -30,7 +30,7 @@ TRANSIENT = {'thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'creep',
 
 def cases(seeds, others, quick=False):
     """Return (group, protocol, effects by strength, seed) of every case."""
-    from hysteresis_ros.laboratory.effects import hidden_effects, unlisted_effects
+    from hysteresis_ros.laboratory.hidden_physics import hidden_effects, unlisted_effects
 
     def protocol(names):
         return 'arm-dynamic' if any(name in TRANSIENT for name in names) else 'arm-steps'
@@ -60,11 +60,11 @@ def base_model(seed, material):
     from hysteresis_ros.bicep import BicepGeometry
     from hysteresis_ros.identification.bench import identify
     from hysteresis_ros.diagnosis.bench_effects import add_effects
+    from hysteresis_ros.laboratory.experiments import experiment_tables
     from hysteresis_ros.laboratory.linkage import GEOMETRY
-    from hysteresis_ros.laboratory.protocols import protocol_tables
     from hysteresis_ros.measurements.table import Measurement
 
-    tables = protocol_tables('bench', {}, seed)
+    tables = experiment_tables('bench', {}, seed)
     force, length = (Measurement.from_columns(tables[name]) for name in
                      ('force.csv', 'length.csv'))
     trials = {'length_trials': range(4), 'force_trials': [0]}
@@ -78,12 +78,12 @@ def run(case, model):
     """Diagnose one case with the model of its specimen and return what is scored."""
     from hysteresis_ros.diagnosis.diagnose import diagnose
     from hysteresis_ros.diagnosis.extend import extend, rmse
-    from hysteresis_ros.laboratory.protocols import protocol_tables
+    from hysteresis_ros.laboratory.experiments import experiment_tables
     from hysteresis_ros.measurements.table import Measurement
 
     group, protocol, effects, seed = case
     started = time.perf_counter()
-    train, test = (Measurement.from_columns(protocol_tables(protocol, effects, seed)[name])
+    train, test = (Measurement.from_columns(experiment_tables(protocol, effects, seed)[name])
                    for name in ('train.csv', 'test.csv'))
     found = diagnose(model, [train], seed=seed)
     reported = set(found.missing).union(*found.alternatives) if found.missing else set()
@@ -96,7 +96,7 @@ def run(case, model):
               'top': [(row['effect'], round(row['rmse_after'], 5), round(row['p_value'], 3))
                       for row in found.ranking[:4]]}
     if group in ('strong', 'weak') and found.missing:
-        clean = Measurement.from_columns(protocol_tables(protocol, {}, seed)['test.csv'])
+        clean = Measurement.from_columns(experiment_tables(protocol, {}, seed)['test.csv'])
         extended = extend(model, found.missing, [train]).model
         result['unseen'] = rmse(extended, [test])
         result['clean'] = rmse(model, [clean])

@@ -24,7 +24,7 @@ from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError
 
 SUPPLY_SAMPLES = 50         # measurements of the supply over which is averaged, about
-SUPPLY_STEP = 0.03          # relative change that is taken at once
+SUPPLY_JUMP = 0.03          # relative change that is taken at once
 STOP_PATIENCE = 0.5         # s to wait on the way out until the board says that it is off
 
 
@@ -71,7 +71,7 @@ class Board:
     * the port does not exist: ``problem`` says so, and opening is tried again for ever;
     * the board falls silent or is unplugged: likewise, after ``timeouts.telemetry``; the output
       stays at zero after that until a new setpoint comes;
-    * the board starts anew: it is greeted and enabled again, the encoder's doubt is in the samples;
+    * the board starts anew: it is greeted and enabled again, the encoder's fault is in the samples;
     * the supply is off or weak: ``limit`` says what the muscle gets instead.
 
     """
@@ -162,8 +162,8 @@ class Board:
             self._target = (voltage, time.monotonic())
             self._tell_writer()
 
-    def rest(self):
-        """Ask for zero until the next `set_voltage`. Never waits."""
+    def set_zero(self):
+        """Ask for 0 V until the next `set_voltage`. Never waits."""
         with self._wake:
             self._target = None
             self._tell_writer()
@@ -185,9 +185,9 @@ class Board:
             self._limit = ''
             self._tell_writer()
 
-    def forgive(self):
-        """Drop the doubt about the encoder's angle, because somebody has checked it."""
-        self._encoder.forgive()
+    def clear_fault(self):
+        """Clear the fault of the encoder's angle, because somebody has checked it."""
+        self._encoder.clear_fault()
 
     @property
     def slowness(self):
@@ -299,7 +299,7 @@ class Board:
     def _smooth(self, supply):
         """Average the supply, so that its noise does not move the muscle to and fro."""
         before = self._supply
-        if before is None or abs(supply - before) > SUPPLY_STEP * self._nominal_supply:
+        if before is None or abs(supply - before) > SUPPLY_JUMP * self._nominal_supply:
             self._supply, self._supply_samples = supply, 1
         else:
             self._supply_samples = min(self._supply_samples + 1, SUPPLY_SAMPLES)

@@ -4,6 +4,7 @@
 
 import dataclasses
 import errno
+import importlib
 import os
 import threading
 import time
@@ -111,9 +112,11 @@ class BoardLink:
         self._bytes = 0
         self._writing = threading.Lock()
         if port.lower().startswith('sim://'):
-            # pyserial takes a handler that fails to import for one that is not there.
-            from hysteresis_ros.bridge.urlhandlers import protocol_sim
-            protocol_sim.check_url(port)
+            # pyserial takes a handler that fails to import for one that is not there, and reads
+            # the URL only when the port is opened.
+            importlib.import_module(f'{HANDLERS}.protocol_sim')
+            from hysteresis_ros.laboratory.board.url import check_url
+            check_url(port)
         self._settings = {'baudrate': baud, 'timeout': READ_TIMEOUT,
                           'write_timeout': timeouts.write, 'exclusive': True}
         self._serial = None

@@ -36,7 +36,7 @@ class Reading(NamedTuple):
     fresh : bool
         Whether this sample was believed.
     fault : str
-        What is wrong, or ''. Faults that leave the angle in doubt stay until `forgive`.
+        What is wrong, or ''. Faults that leave the angle in doubt stay until `clear_fault`.
 
     """
 
@@ -48,7 +48,7 @@ class Reading(NamedTuple):
 
 class Encoder:
     """
-    Angle from counts: direction, zero, wrapping, index and checks.
+    Angle and velocity from quadrature counts, with zero, wrapping, index pulse and checks.
 
     Parameters
     ----------
@@ -112,23 +112,23 @@ class Encoder:
         self._history = collections.deque()
         self._index = None
         self._index_position = None
-        self._doubt = ''
+        self._fault = ''
 
     def restart(self):
         """
         Take note that the board has started anew, so that its counter begins again.
 
-        The arm is taken to be where it was; that is a fault until the index or `forgive` says
-        otherwise.
+        The arm is taken to be where it was; that is a fault until the index pulse or
+        `clear_fault` ends it.
         """
         if self._position is not None:
             self._restarted = True
-            self._doubt = ('the board has started anew: its encoder counter was lost, the angle '
+            self._fault = ('the board has started anew: its encoder counter was lost, the angle '
                            'is carried on from before and may be off')
 
-    def forgive(self):
-        """Drop the doubt about the angle, because somebody has checked it."""
-        self._doubt = ''
+    def clear_fault(self):
+        """Clear the fault of the angle, because somebody has checked it."""
+        self._fault = ''
         self._index_position = None
 
     @property
@@ -160,18 +160,18 @@ class Encoder:
             self._begin(time, counter)
             self._look_at_index(counter, index, latch)
             return self._reading(True, '')
-        step = self._wrap(counter - self._counter)
-        if abs(step) > self._possible(time - self._time):
+        change = self._wrap(counter - self._counter)
+        if abs(change) > self._possible(time - self._time):
             if not self._agrees_with_suspect(time, counter):
                 self._suspect = (time, counter)
-                return self._reading(False, f'encoder counts jumped by {step} within '
+                return self._reading(False, f'encoder counts jumped by {change} within '
                                      f'{time - self._time:.3g} s, which the arm cannot do: '
                                      'sample not believed; check cable and supply')
-            self._doubt = (f'encoder counts jumped by {step} and stayed there: the angle may be '
+            self._fault = (f'encoder counts jumped by {change} and stayed there: the angle may be '
                            'off; check cable and coupling')
             self._history.clear()
         self._suspect = None
-        self._position += step
+        self._position += change
         self._counter = counter
         self._time = time
         self._remember(time)
@@ -226,9 +226,9 @@ class Encoder:
         error = (position - self._index_position + turn // 2) % turn - turn // 2
         if self._index_use == 'home':
             self._move(-error)
-            self._doubt = ''
+            self._fault = ''
         if abs(error) > INDEX_TOLERANCE and not (first and self._index_use == 'home'):
-            self._doubt = (f'the index pulse came {error} counts off its place: counts were lost, '
+            self._fault = (f'the index pulse came {error} counts off its place: counts were lost, '
                            'the angle ' + ('was put right' if self._index_use == 'home'
                                            else 'may be off') + '; check cable and coupling')
 
@@ -243,4 +243,4 @@ class Encoder:
     def _reading(self, fresh, fault):
         (start, before), (end, now) = self._history[0], self._history[-1]
         velocity = self._scale * (now - before) / (end - start) if end > start else 0.0
-        return Reading(self._angle(self._position), velocity, fresh, fault or self._doubt)
+        return Reading(self._angle(self._position), velocity, fresh, fault or self._fault)

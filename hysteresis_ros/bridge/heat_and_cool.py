@@ -19,7 +19,7 @@ PATIENCE = 3.0          # times the planned duration after which a phase is give
 
 class Phase(NamedTuple):
     """
-    What the cycle wants now.
+    One phase of the cycle: the voltage to apply now, and how far it is.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class HeatAndCool:
         Raises
         ------
         BoardError
-            If the board does not apply the voltage, or the arm does not come to rest.
+            If the board does not apply the voltage, or the arm does not stop moving.
 
         """
         if self._begun is None:

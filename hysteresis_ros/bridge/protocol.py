@@ -268,8 +268,8 @@ def parse_line(line):
         return BadLine('its CRC is wrong', _printable(line), right)
     if not match:
         return BadLine('not of the form "kind sequence key=value"', _printable(line), '')
-    kind, sequence, rest = match.groups()
-    pairs = [item.split('=', 1) for item in rest.decode('ascii').split()]
+    kind, sequence, pairs = match.groups()
+    pairs = [item.split('=', 1) for item in pairs.decode('ascii').split()]
     fields = dict(pairs)
     if len(fields) < len(pairs) or int(sequence) >= SEQUENCE_LIMIT:
         return BadLine('a key twice, or a sequence number above 65535', _printable(line), '')
@@ -320,13 +320,13 @@ class Decoder:
 
         """
         found = []
-        *ends, rest = data.split(b'\n')
+        *ends, tail = data.split(b'\n')
         for piece in ends:
             self._append(piece)
             line = self._take()
             if line is not None:
                 found.append(line)
-        self._append(rest)
+        self._append(tail)
         return found
 
     def _append(self, piece):

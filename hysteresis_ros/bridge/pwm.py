@@ -132,10 +132,10 @@ class Pwm:
         duty = ratio * ratio if self.law == 'rms' else ratio
         if duty <= self.maximum_duty:
             return Drive(duty, max(voltage, 0.0), '')
-        voltage_left = self.voltage(self.maximum_duty, supply)
-        return Drive(self.maximum_duty, voltage_left,
+        reachable = self.voltage(self.maximum_duty, supply)
+        return Drive(self.maximum_duty, reachable,
                      f'{voltage:g} V asked, but a supply of {supply:.3g} V with duty '
-                     f'{self.maximum_duty:g} gives {voltage_left:.3g} V')
+                     f'{self.maximum_duty:g} gives {reachable:.3g} V')
 
     def voltage(self, duty, supply):
         """

@@ -7,8 +7,8 @@ All times are in s. Stamps always grow, by at least a microsecond.
 """
 
 LARGEST_DRIFT = 0.001   # relative difference in speed of two clocks that both mean seconds
-LARGEST_STEP = 1.0      # s of difference from which somebody has set a clock
-SMALLEST_STEP = 1e-6    # s
+LARGEST_JUMP = 1.0      # s of difference from which somebody has set a clock
+SMALLEST_DT = 1e-6    # s
 
 
 class RealStamps:
@@ -42,14 +42,14 @@ class RealStamps:
 
         """
         offset = now - time
-        if self._offset is None or abs(offset - self._offset) > LARGEST_STEP:
+        if self._offset is None or abs(offset - self._offset) > LARGEST_JUMP:
             self._offset = offset
             self._last_stamp = -float('inf')
         else:
             drift = LARGEST_DRIFT * (time - self._last_time)
             self._offset = min(offset, self._offset + drift)
         self._last_time = time
-        self._last_stamp = max(time + self._offset, self._last_stamp + SMALLEST_STEP)
+        self._last_stamp = max(time + self._offset, self._last_stamp + SMALLEST_DT)
         return self._last_stamp
 
 
@@ -92,7 +92,7 @@ class SimulatedStamps:
 
         """
         self._last_wall = wall
-        self._last_stamp = max(self._start + time, self._last_stamp + SMALLEST_STEP)
+        self._last_stamp = max(self._start + time, self._last_stamp + SMALLEST_DT)
         return self._last_stamp
 
     def idle(self, wall):

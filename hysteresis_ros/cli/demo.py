@@ -140,10 +140,10 @@ def bench_model(args, folder):
     from hysteresis_ros.bicep import BicepGeometry
     from hysteresis_ros.identification.bench import identify
     from hysteresis_ros.diagnosis.bench_effects import add_effects
-    from hysteresis_ros.laboratory.protocols import write_protocol
+    from hysteresis_ros.laboratory.experiments import write_experiment
     from hysteresis_ros.measurements import read_measurement
 
-    write_protocol('bench', folder / 'bench', {}, args.seed)
+    write_experiment('bench', folder / 'bench', {}, args.seed)
     force, length = (read_measurement(folder / 'bench' / name)
                      for name in ('force.csv', 'length.csv'))
     model = identify(length, force, force_trials=[0], length_trials=range(4),
@@ -160,7 +160,7 @@ def bench_model(args, folder):
 
 def drawn(args):
     """Return the effect to hide, or None."""
-    from hysteresis_ros.laboratory.effects import EFFECTS
+    from hysteresis_ros.laboratory.hidden_physics import EFFECTS
 
     if args.hidden is None or args.hidden in EFFECTS:
         return args.hidden

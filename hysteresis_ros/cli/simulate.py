@@ -49,7 +49,7 @@ def seed(text):
 
 def run(args):
     """Do it."""
-    from hysteresis_ros.laboratory.protocols import write_protocol
+    from hysteresis_ros.laboratory.experiments import write_experiment
 
-    for path in write_protocol(args.protocol, args.output, dict(args.effect), args.seed):
+    for path in write_experiment(args.protocol, args.output, dict(args.effect), args.seed):
         print(path)

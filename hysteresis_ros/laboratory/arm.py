@@ -3,7 +3,7 @@
 """
 The robotic bicep as it lives: voltage in, encoder counts out, in its own time.
 
-In every step the heating warms the wires (Eq. 1), then wires and weights find their balance. The
+In every dt the heating warms the wires (Eq. 1), then wires and weights find their balance. The
 arm follows at once unless it has inertia; with friction it sticks until the wires overcome it.
 """
 
@@ -16,17 +16,18 @@ import numpy as np
 from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.linkage import GEOMETRY, HIGHEST_ANGLE, LOWEST_ANGLE
-from hysteresis_ros.laboratory.muscle import Muscle
+from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.solve import RootFinder
 
 __all__ = ['Arm', 'GEOMETRY']
 
 LENGTH_TOLERANCE = 1e-7
 MOMENT_TOLERANCE = 2e-5
-# Steps in time [s] where the temperature feeds back on itself, and where the arm has inertia.
-COUPLED_STEP = 0.5
-SETTLING_STEP = 1.0
-INERTIAL_STEP = 0.02
+# Longest dt [s] where the temperature feeds back on itself, where the arm settles, and where it has
+# inertia.
+COUPLED_DT = 0.5
+SETTLING_DT = 1.0
+INERTIAL_DT = 0.02
 # Damping of the wires' own, over the critical one, where nothing else damps the arm.
 INNER_DAMPING = 0.03
 # About how stiff the arm is [N m/rad], and how far the wires go with its angle [m/rad].
@@ -35,14 +36,14 @@ TYPICAL_STIFFNESS, TYPICAL_LEVER = 4.0, 0.025
 
 class Arm:
     """
-    One arm with its wires, in the state that its past has left.
+    One arm with its wires, in the state to which its past has brought it.
 
     Parameters
     ----------
     conditions : Conditions
         What this arm is really like.
     seed : int or sequence of int
-        Of everything that is left to chance.
+        Of everything that is random.
 
     Attributes
     ----------
@@ -58,14 +59,14 @@ class Arm:
 
     def __init__(self, conditions: Conditions, seed=0):
         self.conditions = conditions
-        self.muscle = Muscle(conditions)
-        self._chance = np.random.default_rng(seed)
+        self.muscle = ParallelWires(conditions)
+        self._rng = np.random.default_rng(seed)
         self.time = 0.0
         self.angle = 2.2
         self.tensions = [5.0] * len(self.muscle.wires)
         coupled = (conditions.heat.latent or conditions.resistance_growth or conditions.viscous
                    or conditions.disturbances or conditions.creep)
-        self._settling_step = SETTLING_STEP if coupled else math.inf
+        self._settling_dt = SETTLING_DT if coupled else math.inf
         if len(self.muscle.wires) == 1:
             self._find = RootFinder(TYPICAL_LEVER, LENGTH_TOLERANCE)
         else:
@@ -93,14 +94,14 @@ class Arm:
         voltage : float
             RMS voltage at the board's output.
         """
-        longest = INERTIAL_STEP if self.conditions.inertia > 0.0 else COUPLED_STEP
-        for step in _parts(dt, longest):
-            self._step(step, voltage, moving=self.conditions.inertia > 0.0)
+        longest = INERTIAL_DT if self.conditions.inertia > 0.0 else COUPLED_DT
+        for part in _parts(dt, longest):
+            self._step(part, voltage, moving=self.conditions.inertia > 0.0)
 
     def settle(self, hold: float, voltage: float) -> None:
         """Let the arm come to rest under a voltage [V] held for `hold` [s]."""
-        for step in _parts(hold, self._settling_step):
-            self._step(step, voltage, moving=False)
+        for part in _parts(hold, self._settling_dt):
+            self._step(part, voltage, moving=False)
         self._velocity = 0.0
         self._history.clear()
         self._history.append((self.time, self._seen()))
@@ -127,12 +128,12 @@ class Arm:
     @property
     def ambient_temperature(self) -> float:
         """What the thermometer beside the arm shows [degC]."""
-        return sensors.thermometer(self.conditions.air.recorded(self.time), self._chance)
+        return sensors.thermometer(self.conditions.air.recorded(self.time), self._rng)
 
     @property
     def supply_voltage(self) -> float:
         """What the board measures of its own supply [V]."""
-        return sensors.supply_meter(self._chance)
+        return sensors.supply_meter(self._rng)
 
     def _room(self) -> float:
         air = self.conditions.air
@@ -146,7 +147,7 @@ class Arm:
         air = conditions.air
         kept = math.exp(-dt / air.turbulence_time)
         self._fluctuation = kept * self._fluctuation + (
-            air.turbulence * math.sqrt(1.0 - kept * kept) * self._chance.standard_normal())
+            air.turbulence * math.sqrt(1.0 - kept * kept) * self._rng.standard_normal())
         self._heat(dt, voltage)
         extra = sum(one.excess(self.time, self.tensions[0]) for one in conditions.disturbances)
         self.muscle.age(voltage, dt, extra)
@@ -164,9 +165,9 @@ class Arm:
             airflow *= one.airflow(self.time)
             contact *= one.contact(self.time, self.angle)
         martensite = self.muscle.martensite
-        square = conditions.heating_square(voltage, martensite, contact)
+        drive_squared = conditions.drive_squared(voltage, martensite, contact)
         self.temperature = heat.advance(
-            self.temperature, heat.balance(square, room, airflow), dt, airflow,
+            self.temperature, heat.balance(drive_squared, room, airflow), dt, airflow,
             functools.partial(self.muscle.share, self.tensions), martensite)
 
     def _needed(self, theta: float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.heat import ROOM
-from hysteresis_ros.laboratory.muscle import Muscle
+from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.solve import RootFinder
 from hysteresis_ros.laboratory.wire import (
     LARGEST_TENSION, LENGTH_TOLERANCE, TYPICAL_COMPLIANCE)
@@ -21,8 +21,8 @@ from hysteresis_ros.laboratory.wire import (
 # Stiffness of load cell, capstan and servo motor [N/m].
 BENCH_STIFFNESS = 5e3
 HOLD = 30.0
-# Steps in time [s] where something changes during a hold.
-CREEPING_STEP = 1.0
+# dt [s] where something changes during a hold.
+CREEPING_DT = 1.0
 
 
 class Bench:
@@ -39,8 +39,8 @@ class Bench:
 
     def __init__(self, conditions: Conditions, seed=0):
         self.conditions = conditions
-        self._muscle = Muscle(conditions)
-        self._chance = np.random.default_rng(seed)
+        self._muscle = ParallelWires(conditions)
+        self._rng = np.random.default_rng(seed)
 
     def force_trial(self, voltages, hold: float = HOLD) -> np.ndarray:
         """
@@ -67,7 +67,7 @@ class Bench:
                 lambda force: wire.elongation(temperature, force)
                 + (force - pretension) / BENCH_STIFFNESS,
                 before, 0.0, LARGEST_TENSION)
-        return np.array([sensors.load_cell(force, self._chance)
+        return np.array([sensors.load_cell(force, self._rng)
                          for force in self._hold(voltages, hold, clamped, pretension)])
 
     def length_trial(self, voltages, load: float, hold: float = HOLD) -> np.ndarray:
@@ -91,7 +91,7 @@ class Bench:
         wire, lengths = self._muscle.wires[0], []
         for _ in self._hold(voltages, hold, lambda temperature, before: load, load):
             lengths.append(wire.elongation(self._temperature, load))
-        return np.array([sensors.position_sensor(length, self._chance) for length in lengths])
+        return np.array([sensors.position_sensor(length, self._rng) for length in lengths])
 
     def _hold(self, voltages, hold, equilibrium, tension):
         """Heat and cool, then hold each voltage and yield the tension at its end."""
@@ -99,10 +99,10 @@ class Bench:
         muscle.heat_and_cool(ROOM)
         temperature = ROOM
         muscle.commit(temperature, [tension])
-        count = math.ceil(hold / CREEPING_STEP) if conditions.creep > 0.0 else 1
+        count = math.ceil(hold / CREEPING_DT) if conditions.creep > 0.0 else 1
         for voltage in np.asarray(voltages, dtype=float).tolist():
             balance = heat.balance(voltage * voltage, ROOM)
-            fluctuation = conditions.air.turbulence * self._chance.standard_normal()
+            fluctuation = conditions.air.turbulence * self._rng.standard_normal()
             for _ in range(count):
                 temperature = heat.advance(temperature, balance + fluctuation, hold / count)
                 muscle.age(voltage, hold / count)

@@ -34,7 +34,7 @@ class Disturbance:
         return 0.0
 
     def airflow(self, time: float) -> float:
-        """Return the heat transfer over the usual one."""
+        """Return the heat transfer over that of the bench."""
         return 1.0
 
     def contact(self, time: float, theta: float) -> float:
@@ -160,7 +160,7 @@ class Conditions:
     disturbances: list = dataclasses.field(default_factory=list)
     recording_time: float = 900.0
 
-    def heating_square(self, voltage: float, martensite: float, contact: float = 1.0) -> float:
+    def drive_squared(self, voltage: float, martensite: float, contact: float = 1.0) -> float:
         """
         Return the square of the voltage that heats an austenitic wire as much [V^2].
 

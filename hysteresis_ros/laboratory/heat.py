@@ -17,7 +17,7 @@ GAIN = 2.7
 ROOM = 22.0
 # Specific heat of the wire [J/(kg K)].
 SPECIFIC_HEAT = 500.0
-# Heat counts as shared out when less than this is left over, over the specific heat [K].
+# Heat counts as shared out when the residual is below this, over the specific heat [K].
 HEAT_TOLERANCE = 1e-4
 
 
@@ -46,20 +46,20 @@ class HeatBalance:
     heating_ratio: float = 1.0
     latent: float = 0.0
 
-    def balance(self, square: float, room: float, airflow: float = 1.0) -> float:
+    def balance(self, drive_squared: float, room: float, airflow: float = 1.0) -> float:
         """
         Return the temperature [degC] at which heating and cooling are equal.
 
         Parameters
         ----------
-        square : float
+        drive_squared : float
             Square of the heating voltage [V^2].
         room : float
             Temperature of the air [degC].
         airflow : float
-            Momentary heat transfer over the usual one.
+            Momentary heat transfer over that of the bench.
         """
-        return room + self.gain * square / (self.airflow * airflow)
+        return room + self.gain * drive_squared / (self.airflow * airflow)
 
     def advance(self, temperature: float, balance: float, dt: float, airflow: float = 1.0,
                 share: Callable[[float], float] | None = None, before: float = 0.0) -> float:
@@ -73,7 +73,7 @@ class HeatBalance:
         dt : float
             Time [s].
         airflow : float
-            Momentary heat transfer over the usual one.
+            Momentary heat transfer over that of the bench.
         share : callable or None
             Martensite share that the wire has at a temperature, where latent heat counts.
         before : float
@@ -85,8 +85,8 @@ class HeatBalance:
         change = (balance - temperature) * (1.0 - math.exp(-rate * dt))
         if self.latent == 0.0 or share is None or abs(change) < 1e-9:
             return temperature + change
-        # The heat that came in is shared by warming and transforming: of the change, that part is
-        # left for the temperature with which nothing is left over.
+        # The heat that came in is shared by warming and transforming: the temperature gets the part
+        # of the change with which the heat balance has no residual.
         sign = math.copysign(1.0, change)
         part = RootFinder(2.0 * abs(change), HEAT_TOLERANCE)(
             lambda part: abs(change) * (part - 1.0) + sign * self.latent * (

@@ -5,7 +5,7 @@ One specimen of everything: its wire on the bench, and its arm.
 
 About time. Eq. 1 always holds, but how fast the wire follows is a property of the plant,
 `heat_time_constant`: 5 s by default, as in the paper, on the bench, for settled steps and for the
-simulated board. Continuous recordings of the protocol `arm-dynamic` are made with a thin wire on
+simulated board. Continuous recordings of the experiment `arm-dynamic` are made with a thin wire on
 which the heat has come and gone before the next sample, `BRISK` = 0.02 s, so that an arm without
 any hidden effect is quasi-static at 10 Hz (0.15 s already shows as a lag);
 `thermal_lag`, `heating_cooling_asymmetry` and `latent_heat` bring their own seconds along.
@@ -25,8 +25,8 @@ from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.bench import Bench, HOLD
 from hysteresis_ros.laboratory.conditions import Conditions
-from hysteresis_ros.laboratory.effects import apply_effects
 from hysteresis_ros.laboratory.heat import HeatBalance
+from hysteresis_ros.laboratory.hidden_physics import apply_effects
 from hysteresis_ros.laboratory.wire import WireMaterial
 
 # Time constants of Eq. 1 [s]: in the paper, and in continuous recordings.
@@ -42,18 +42,18 @@ def specimen(seed: int) -> WireMaterial:
     seed : int
         Which batch.
     """
-    chance = np.random.default_rng([seed, 101])
+    rng = np.random.default_rng([seed, 101])
 
     def vary(value, share):
-        return value * (1.0 + share * chance.uniform(-1.0, 1.0))
+        return value * (1.0 + share * rng.uniform(-1.0, 1.0))
     usual = WireMaterial()
     grains = dataclasses.replace(
-        usual.grains, start=usual.grains.start + chance.uniform(0.0, 1.5),
+        usual.grains, start=usual.grains.start + rng.uniform(0.0, 1.5),
         spread=vary(usual.grains.spread, 0.06), shape=vary(usual.grains.shape, 0.05),
         tail=vary(usual.grains.tail, 0.08), loop=vary(usual.grains.loop, 0.05),
         loop_growth=vary(usual.grains.loop_growth, 0.08))
     return dataclasses.replace(
-        usual, grains=grains, grain_offset=chance.uniform(),
+        usual, grains=grains, grain_offset=rng.uniform(),
         austenite_modulus=vary(usual.austenite_modulus, 0.04),
         martensite_modulus=vary(usual.martensite_modulus, 0.04),
         strain_without_load=vary(usual.strain_without_load, 0.03),
@@ -103,7 +103,7 @@ class Plant:
         apply_effects(conditions, self.effects, seed, recording)
         self.bench = Bench(bench, seed=[seed, recording, 11])
         self.arm = Arm(conditions, seed=[seed, recording, 12])
-        self._chance = np.random.default_rng([seed, recording, 13])
+        self._rng = np.random.default_rng([seed, recording, 13])
 
     def force_trial(self, voltages) -> np.ndarray:
         """Return the settled forces [N] of the wire at its resting length, from the cold state."""
@@ -166,8 +166,8 @@ class Plant:
     def _read(self) -> tuple[float, float, float]:
         arm = self.arm
         return (sensors.counted_angle(arm.encoder_counts),
-                sensors.thermometer(arm.conditions.air.recorded(arm.time), self._chance),
-                sensors.supply_meter(self._chance))
+                sensors.thermometer(arm.conditions.air.recorded(arm.time), self._rng),
+                sensors.supply_meter(self._rng))
 
     @staticmethod
     def _columns(time, voltage, rows) -> dict[str, np.ndarray]:

@@ -29,23 +29,23 @@ def counted_angle(counts: int) -> float:
     return (counts + 0.5) * COUNT
 
 
-def load_cell(force: float, chance: np.random.Generator) -> float:
+def load_cell(force: float, rng: np.random.Generator) -> float:
     """Return the load cell's reading of a force [N]."""
-    return force + FORCE_NOISE * chance.standard_normal()
+    return force + FORCE_NOISE * rng.standard_normal()
 
 
-def position_sensor(length: float, chance: np.random.Generator) -> float:
+def position_sensor(length: float, rng: np.random.Generator) -> float:
     """Return the position sensor's reading of an elongation [m]."""
-    noisy = length + LENGTH_NOISE * chance.standard_normal()
+    noisy = length + LENGTH_NOISE * rng.standard_normal()
     return LENGTH_RESOLUTION * round(noisy / LENGTH_RESOLUTION)
 
 
-def thermometer(temperature: float, chance: np.random.Generator) -> float:
+def thermometer(temperature: float, rng: np.random.Generator) -> float:
     """Return the ambient thermometer's reading [degC]."""
-    noisy = temperature + 0.5 * AMBIENT_RESOLUTION * chance.standard_normal()
+    noisy = temperature + 0.5 * AMBIENT_RESOLUTION * rng.standard_normal()
     return AMBIENT_RESOLUTION * round(noisy / AMBIENT_RESOLUTION)
 
 
-def supply_meter(chance: np.random.Generator) -> float:
+def supply_meter(rng: np.random.Generator) -> float:
     """Return the board's reading of its own regulated supply [V]."""
-    return SUPPLY + SUPPLY_NOISE * chance.standard_normal()
+    return SUPPLY + SUPPLY_NOISE * rng.standard_normal()

@@ -24,14 +24,14 @@ class Events:
         How many there are on average in `duration`.
     duration : float
         Typical length of a recording [s]; the moments go on for four times as long.
-    chance : numpy.random.Generator
-        Source of chance.
+    rng : numpy.random.Generator
+        Random generator.
     """
 
-    def __init__(self, count: float, duration: float, chance: np.random.Generator):
-        gaps = chance.exponential(1.0, size=int(8 * count) + 8) + 0.3
+    def __init__(self, count: float, duration: float, rng: np.random.Generator):
+        gaps = rng.exponential(1.0, size=int(8 * count) + 8) + 0.3
         self.times = np.cumsum(gaps) * duration / (1.3 * count)
-        self.signs = np.where(chance.random(len(gaps)) < 0.5, -1.0, 1.0)
+        self.signs = np.where(rng.random(len(gaps)) < 0.5, -1.0, 1.0)
 
     def passed(self, time: float) -> int:
         """Return how many moments have passed."""
@@ -54,7 +54,7 @@ class Unlisted(Disturbance):
     conditions : Conditions
         Of the arm on which it acts.
     specimen, recording : numpy.random.Generator
-        Source of chance for what belongs to the arm, and for what differs between recordings.
+        Random generators for what belongs to the arm, and for what differs between recordings.
     """
 
     def __init__(self, size, conditions, specimen, recording):
@@ -64,7 +64,7 @@ class Unlisted(Disturbance):
         self.prepare(specimen, recording)
 
     def prepare(self, specimen, recording):
-        """Draw what is left to chance."""
+        """Draw the random numbers that the effect needs."""
 
 
 class StiffeningCable(Unlisted):
@@ -158,9 +158,9 @@ class Magnet(Unlisted):
         self._middle = math.radians(specimen.uniform(112.0, 122.0))
 
     def moment(self, time, theta):
-        """Pull towards the angle, most strongly a little beside it."""
-        beside = (theta - self._middle) / math.radians(6.0)
-        return -0.13 * self.size * beside * math.exp(0.5 - 0.5 * beside * beside)
+        """Pull towards the angle, most strongly a little off it."""
+        offset = (theta - self._middle) / math.radians(6.0)
+        return -0.13 * self.size * offset * math.exp(0.5 - 0.5 * offset * offset)
 
 
 class LooseSetScrew(Unlisted):
@@ -208,7 +208,7 @@ class TornWire(Unlisted):
         self._moment = recording.uniform(0.35, 0.65) * self.duration
 
     def moment(self, time, theta):
-        """Ask as much of the wires that are left as all of them had to give."""
+        """Ask as much of the remaining wires as all of them had to give."""
         return 0.5 * self.size * self.linkage.moment(theta) if time > self._moment else 0.0
 
 

@@ -127,7 +127,7 @@ class BridgeNode(Node):
         self._wanted = wanted
         self._board.enable(wanted)
         if wanted:
-            self._board.forgive()
+            self._board.clear_fault()
         if not status.online:
             response.success = True
             response.message = 'disabled; the board is not there, and will stay off'
@@ -212,10 +212,10 @@ class BridgeNode(Node):
         elif phase.voltage > 0.0:
             self._board.set_voltage(phase.voltage)
         else:
-            self._board.rest()
+            self._board.set_zero()
 
     def _end_cycle(self, success, message):
-        self._board.rest()
+        self._board.set_zero()
         self._cycle = None
         self._outcome = success, message
 

@@ -46,7 +46,7 @@ COMPENSATION = (
     Spec('feedback_limit', 0.15, 'Largest correction of the target angle', 'rad', 0.0, 1.0),
     Spec('feedback_rest_speed', 0.005, 'Speed above which the arm is on its way and the '
          'correction waits', 'rad/s', 0.0001, 10.0),
-    Spec('feedback_dead_band', 0.003, 'Angle error that is left alone', 'rad', 0.0, 1.0),
+    Spec('feedback_dead_band', 0.003, 'Angle error that is not corrected', 'rad', 0.0, 1.0),
     Spec('feedback_period', 1.0, 'Time between two corrections', 's', 0.01, 60.0),
     Spec('feedback_delay', 10.0, 'Time after a new reference before the first correction', 's',
          0.0, 600.0),
@@ -144,7 +144,7 @@ class CompensatorNode(Node):
         correction = self._integral.correction
         if correction == 0.0:
             return wanted
-        # What the geometry alone says of a small turn; the rest of the reference stays.
+        # The change that the geometry alone gives for a small turn; everything else stays.
         low, high = self._geometry.angle_range
         before = float(self._geometry.angle(wanted.length))
         after = min(max(before + correction, low), high)
@@ -191,7 +191,7 @@ class CompensatorNode(Node):
         if self._wanted is None or angle is None:
             return
         before = self._integral.correction
-        correction = self._integral.step(
+        correction = self._integral.update(
             seconds(message.header.stamp), angle, self._target, self._saturated)
         if correction != before:
             self._corrections += self._apply(self._corrected(self._wanted))

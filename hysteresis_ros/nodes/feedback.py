@@ -1,10 +1,10 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Slow integral feedback of the arm's angle, beside the inverse model (Sec. VIII of the paper).
+Slow integral feedback of the arm's angle, on top of the inverse model (Sec. VIII of the paper).
 
-The inverse does the large and fast part of the work; the integral takes out what stays at rest,
-such as a payload that is heavier than the model's. Its authority is limited, so that a broken
+The inverse does the large and fast part of the work; the integral takes out the steady error, such
+as that of a payload that is heavier than the model's. Its authority is limited, so that a broken
 sensor can move the arm only that far.
 """
 
@@ -23,12 +23,12 @@ class AngleFeedback:
         Largest correction in either direction [rad].
     rest_speed : float
         Speed [rad/s] above which the arm counts as moving; then the integral waits, because the
-        error of an arm on its way says nothing about where it will come to rest.
+        error of a moving arm says nothing about where it will settle.
     dead_band : float
-        Errors up to this [rad] are left alone: an integral that chases the encoder's last count
-        never comes to rest on a muscle with hysteresis.
+        Errors up to this [rad] are not corrected: an integral that chases the encoder's last count
+        never settles on a muscle with hysteresis.
     period : float
-        Time between two steps of the integral [s]; samples between them are passed over.
+        Time between two updates of the integral [s]; samples between them are passed over.
     delay : float
         Time after `begin` [s] in which samples do not count: they may be older than the new
         target, or of an arm that has not set out for it yet.
@@ -60,7 +60,7 @@ class AngleFeedback:
         self._time = None
         self._angle = None
 
-    def step(self, time: float, angle: float, target: float, saturated: int = 0) -> float:
+    def update(self, time: float, angle: float, target: float, saturated: int = 0) -> float:
         """
         Take one sample of the angle.
 

@@ -1,7 +1,7 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The model beside the arm: what it predicts for the applied voltage, and what is left over.
+The model run along with the arm: its prediction for the applied voltage, and the residual.
 
 Subscribes `applied_voltage` and `joint_states`; for each measured angle it publishes
 `predicted_joint_states` with the same stamp, and `model_residual`, measured less predicted. The

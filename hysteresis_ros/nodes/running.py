@@ -37,8 +37,8 @@ def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
 
     Notes
     -----
-    If the node has a method ``on_shutdown``, it is called first on the way out, while the node
-    still can publish its last words to its board.
+    If the node has a method ``on_shutdown``, it is called first on the way out, while the node can
+    still publish and write to its board.
     """
     node = None
     status = 0
@@ -66,10 +66,10 @@ def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
 
 class Ending:
     """
-    Takes Ctrl-C and SIGTERM, and lets what is going on come to its end first.
+    Takes Ctrl-C and SIGTERM, and lets the running callback finish first.
 
-    Neither an exception in the middle of anything nor rclpy shut down from another thread: half a
-    node or half a message could not say its last words. `ros2 launch` signals every node twice;
+    It neither raises an exception in the middle of a callback nor shuts rclpy down from another
+    thread: a half-made node could not publish on shutdown. `ros2 launch` signals every node twice;
     the second signal changes nothing.
     """
 

@@ -8,13 +8,13 @@ from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.heat import ROOM
 from hysteresis_ros.laboratory.wire import Wire
 
-# A setpoint that changes by less than this [V] from one step to the next is held.
+# A setpoint that changes by less than this [V] within one dt is held.
 HELD = 6e-3
-# Creep that a new step leaves behind fades as the grains that crept are overtaken [s].
+# Time constant with which the creep of earlier setpoints fades: later ones overtake its grains [s].
 FADING = 1.0
 
 
-class Muscle:
+class ParallelWires:
     """
     Parallel wires; those that are alike are computed once.
 

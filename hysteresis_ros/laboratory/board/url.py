@@ -7,7 +7,7 @@ What ``sim://bicep?key=value&...`` asks for: speed, seed, faults, and physical e
 key             meaning
 =============== ===================================================================================
 speed           how much faster than the wall's clock the arm lives (0.01 to 1000; 1)
-seed            which specimen of arm and wire, and all that is left to chance (0)
+seed            which specimen of arm and wire, and all that is random (0)
 recording       which recording on that specimen: another one has other noise (0)
 recording_time  how long it takes, about, in s, for effects that are slow or rare (900)
 time_constant   of the wires' heating and cooling in s (0.05 to 100; 5 as in the paper)
@@ -32,6 +32,8 @@ import math
 from urllib.parse import parse_qsl, urlsplit
 
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory.hidden_physics import EFFECTS
+from hysteresis_ros.laboratory.plant import Plant
 
 SCHEME = 'sim'
 ARM = 'bicep'
@@ -68,7 +70,7 @@ class Simulation:
     effects: dict = dataclasses.field(default_factory=dict)
 
 
-def parse_url(url, known_effects):
+def parse_url(url: str) -> Simulation:
     """
     Read a ``sim://`` URL.
 
@@ -76,8 +78,6 @@ def parse_url(url, known_effects):
     ----------
     url : str
         As given for the parameter ``port``.
-    known_effects : collection of str
-        Effects that the laboratory has.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def parse_url(url, known_effects):
             raise ParameterError(f'port {url}: {key} is given twice')
         if key in _RANGES:
             values[key] = _number(url, key, text, _RANGES[key])
-        elif key in known_effects:
+        elif key in EFFECTS:
             effects[key] = _number(url, key, text, _STRENGTHS)
         else:
             raise ParameterError(
@@ -107,7 +107,48 @@ def parse_url(url, known_effects):
     return Simulation(**values, effects=effects)
 
 
-def _number(url, key, text, limits):
+def make_plant(simulation: Simulation) -> Plant:
+    """
+    Build the specimen of the virtual laboratory that a URL asks for.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        As read from the URL.
+
+    Returns
+    -------
+    Plant
+
+    Raises
+    ------
+    ParameterError
+        If an effect cannot have this strength.
+
+    """
+    return Plant(simulation.seed, simulation.effects, simulation.time_constant,
+                 simulation.recording, simulation.recording_time)
+
+
+def check_url(url: str) -> None:
+    """
+    Refuse a URL that makes no sense, before anybody opens it.
+
+    Parameters
+    ----------
+    url : str
+        As given for the parameter ``port``.
+
+    Raises
+    ------
+    ParameterError
+        If the arm, a key, a value or an effect's strength is not known.
+
+    """
+    make_plant(parse_url(url))
+
+
+def _number(url: str, key: str, text: str, limits: tuple) -> float:
     low, high = limits
     convert = int if isinstance(low, int) else float
     try:

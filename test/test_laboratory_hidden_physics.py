@@ -8,10 +8,10 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import EFFECTS, hidden_effects, Plant, unlisted_effects
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Air, Conditions
-from hysteresis_ros.laboratory.effects import apply_effects
 from hysteresis_ros.laboratory.heat import GAIN, HeatBalance
+from hysteresis_ros.laboratory.hidden_physics import apply_effects
 from hysteresis_ros.laboratory.linkage import Linkage
-from hysteresis_ros.laboratory.muscle import Muscle
+from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.plant import BRISK
 from hysteresis_ros.laboratory.sequences import repeated_loop, steps_of_all_speeds
 from hysteresis_ros.laboratory.unlisted import Events
@@ -85,22 +85,22 @@ def test_signed_effects_turn_round(name):
 def test_supply_sag_is_ohms_law():
     """Board and wire share the voltage as their resistances."""
     conditions = Conditions(lead_resistance=2.0)
-    assert conditions.heating_square(5.0, 0.3) == pytest.approx(16.0)
+    assert conditions.drive_squared(5.0, 0.3) == pytest.approx(16.0)
 
 
 def test_dead_zone():
     """Nothing below it, all of the range above it."""
     conditions = Conditions(dead_voltage=1.0)
-    assert conditions.heating_square(1.0, 0.0) == 0.0
-    assert conditions.heating_square(6.0, 0.0) == pytest.approx(36.0)
-    assert conditions.heating_square(3.5, 0.0) == pytest.approx(9.0)
+    assert conditions.drive_squared(1.0, 0.0) == 0.0
+    assert conditions.drive_squared(6.0, 0.0) == pytest.approx(36.0)
+    assert conditions.drive_squared(3.5, 0.0) == pytest.approx(9.0)
 
 
 def test_resistance_depends_on_the_phase():
     """The more resistance the martensite has, the less the same voltage heats it."""
     conditions = Conditions(resistance_growth=0.25)
-    assert conditions.heating_square(4.0, 1.0) == pytest.approx(16.0 / 1.25)
-    assert conditions.heating_square(4.0, 0.0) == pytest.approx(16.0)
+    assert conditions.drive_squared(4.0, 1.0) == pytest.approx(16.0 / 1.25)
+    assert conditions.drive_squared(4.0, 0.0) == pytest.approx(16.0)
     strong = shift('resistance_change', [6.0, MIDDLE])
     assert abs(strong[0]) < 0.2 < abs(strong[1])
 
@@ -212,7 +212,7 @@ def test_creep_follows_the_logarithm_of_time():
 def test_creep_of_a_full_transformation():
     """After 57 s it is the share c of the length times ln(1 + 57 / 3), as the wires contract."""
     conditions = Conditions(creep=0.004, creep_time=3.0)
-    muscle = Muscle(conditions)
+    muscle = ParallelWires(conditions)
     muscle.age(6.0, 0.1)
     muscle.commit(120.0, [3.0])
     muscle.age(6.0, 57.0)

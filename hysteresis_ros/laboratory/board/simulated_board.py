@@ -19,7 +19,7 @@ from hysteresis_ros.bridge.protocol import (
     BadLine, decimal, Decoder, encode, Frame, integer, SEQUENCE_LIMIT, VERSION)
 from hysteresis_ros.errors import ProtocolError
 
-TICK = 20                   # ms; the arm is advanced in these steps
+TICK = 20                   # ms; dt of the arm and of the firmware's loop
 PERIOD = 100                # ms between two frames of telemetry, until `config` says otherwise
 WATCHDOG = 1000             # ms without a setpoint that switch the output off, likewise
 AMBIENT_PERIOD = 1000       # ms between two measurements of the ambient temperature
@@ -31,7 +31,7 @@ COUNTS_PER_REVOLUTION = 8192
 SUPPLY_NOISE = 0.01         # V, standard deviation of the supply's measurement
 
 BROWNOUT_TIME = 300         # ms that a brownout takes; then the board starts anew
-BROWNOUT_SUPPLY = 0.2       # what it leaves of the supply
+BROWNOUT_SUPPLY = 0.2       # share of the nominal supply during it
 
 
 class SimulatedBoard:
@@ -145,7 +145,7 @@ class SimulatedBoard:
         Parameters
         ----------
         ticks : int
-            Number of steps of `TICK` ms.
+            How many times `TICK` ms pass.
 
         """
         for _ in range(ticks):
@@ -170,7 +170,7 @@ class SimulatedBoard:
         Parameters
         ----------
         ticks : int
-            Number of steps of `TICK` ms.
+            How many times `TICK` ms pass.
 
         """
         for _ in range(ticks):

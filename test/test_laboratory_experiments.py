@@ -3,8 +3,9 @@
 """The experiments of the virtual laboratory: sequences and the tables that they write."""
 
 from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.laboratory import EFFECTS, GEOMETRY, protocol_tables, sequences, write_protocol
-from hysteresis_ros.laboratory.protocols import LOADS
+from hysteresis_ros.laboratory import (
+    EFFECTS, experiment_tables, GEOMETRY, sequences, write_experiment)
+from hysteresis_ros.laboratory.experiments import LOADS
 from hysteresis_ros.measurements.csv import read_csv
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def test_continuous_sequences():
 
 def test_bench_tables(tmp_path):
     """Force and length tables with the paper's numbers of steps, and the geometry."""
-    files = write_protocol('bench', tmp_path / 'new', seed=3)
+    files = write_experiment('bench', tmp_path / 'new', seed=3)
     assert [file.name for file in files] == ['force.csv', 'length.csv', 'geometry.yaml']
     force, length = read_csv(files[0]), read_csv(files[1])
     assert (force.kind, force.response, force.rows) == ('bench', 'force', 37 + 74)
@@ -65,7 +66,7 @@ def test_bench_tables(tmp_path):
                                                      ('arm-dynamic', 6000, 12000)])
 def test_arm_tables(tmp_path, name, least, most):
     """Two recordings of several trials each, settled ones 30 s apart, others at 10 Hz."""
-    files = write_protocol(name, tmp_path)
+    files = write_experiment(name, tmp_path)
     assert [file.name for file in files] == ['train.csv', 'test.csv']
     for file in files:
         table = read_csv(file)
@@ -87,7 +88,7 @@ def test_arm_tables(tmp_path, name, least, most):
 @pytest.mark.parametrize('name', ['bench', 'arm-steps'])
 def test_same_seed_same_tables(name):
     """The tables are those of the seed; train and test differ."""
-    tables = [protocol_tables(name, {'creep': 0.4}, seed) for seed in (6, 6, 7)]
+    tables = [experiment_tables(name, {'creep': 0.4}, seed) for seed in (6, 6, 7)]
     for file, columns in tables[0].items():
         for column, values in columns.items():
             np.testing.assert_array_equal(values, tables[1][file][column])
@@ -97,11 +98,11 @@ def test_same_seed_same_tables(name):
         assert np.any(tables[0]['train.csv']['voltage'] != tables[0]['test.csv']['voltage'])
 
 
-def test_the_files_do_not_tell(tmp_path):
+def test_files_do_not_name_the_hidden_effects(tmp_path):
     """Neither names nor headers nor the drive say which effect is hidden."""
     texts = []
     for effects in ({}, {'payload_error': 1.0}):
-        files = write_protocol('arm-steps', tmp_path / str(len(effects)), effects, seed=1)
+        files = write_experiment('arm-steps', tmp_path / str(len(effects)), effects, seed=1)
         texts.append([file.read_text() for file in files])
     for plain, hidden in zip(*texts):
         assert plain != hidden
@@ -111,8 +112,8 @@ def test_the_files_do_not_tell(tmp_path):
         assert drive[0] == drive[1]
 
 
-def test_unknown_protocols_are_refused(tmp_path):
+def test_unknown_experiments_are_refused(tmp_path):
     """The message lists those that exist, and nothing is written."""
     with pytest.raises(ParameterError, match='arm-dynamic'):
-        write_protocol('dance', tmp_path / 'none')
+        write_experiment('dance', tmp_path / 'none')
     assert not (tmp_path / 'none').exists()

@@ -7,7 +7,7 @@ import math
 from hypothesis import given, settings, strategies as st
 from hysteresis_ros.bridge.messages import Identity, Telemetry
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame, Remark
-from hysteresis_ros.bridge.simulated_board import PERIOD, SimulatedBoard, TICK, WATCHDOG
+from hysteresis_ros.laboratory.board.simulated_board import PERIOD, SimulatedBoard, TICK, WATCHDOG
 import pytest
 
 
@@ -62,7 +62,7 @@ class Bench:
                 return Telemetry.from_frame(frame)
 
 
-def test_says_who_it_is():
+def test_hello_is_answered_with_the_identity():
     bench = Bench(speed=60.0)
     assert isinstance(bench.lines()[0], Remark)
     bench.advance(500)
@@ -89,7 +89,7 @@ def test_sends_telemetry_on_its_own():
     assert [frame.fields.get('ambient') for frame in frames] == ['21.50'] + [None] * 9
 
 
-def test_period_can_be_chosen():
+def test_telemetry_period_is_configurable():
     bench = Bench()
     answer, = bench.ask('config', period=250, watchdog=500)
     assert answer.kind == 'ok' and answer.fields['re'] == str(bench.sequence)
@@ -126,7 +126,7 @@ def test_watchdog_counts_in_board_time_and_only_setpoints_feed_it():
     assert bench.telemetry().faults == ()
 
 
-def test_watchdog_can_be_chosen():
+def test_watchdog_time_is_configurable():
     bench = Bench()
     bench.ask('config', period=100, watchdog=200)
     bench.ask('enable')
@@ -193,7 +193,7 @@ def test_full_and_no_duty_are_both_in_range():
     assert bench.ask('set', duty=1.0) == bench.ask('set', duty=0.0) == []
 
 
-def test_arm_lives_on_without_power():
+def test_arm_cools_on_without_power():
     bench = Bench()
     bench.ask('enable')
     bench.ask('set', duty=1.0)
@@ -235,7 +235,7 @@ def test_explanations_do_not_flood():
 
 @given(st.lists(st.binary(max_size=100), max_size=10))
 @settings(max_examples=50)
-def test_no_bytes_disturb_it(chunks):
+def test_any_bytes_are_survived(chunks):
     bench = Bench()
     for chunk in chunks:
         bench.board.receive(chunk)

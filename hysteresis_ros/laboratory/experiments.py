@@ -37,15 +37,15 @@ Table = dict[str, np.ndarray]
 def bench_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
     """Return the tables of the bench, by file name."""
     plant = Plant(seed, effects)
-    chance = np.random.default_rng([seed, 21])
+    rng = np.random.default_rng([seed, 21])
     oscillation = sequences.damped_oscillation()
     force, length = [], []
-    for voltage in (oscillation, sequences.random_steps(FORCE_STEPS, chance)):
+    for voltage in (oscillation, sequences.random_steps(FORCE_STEPS, rng)):
         force.append({'step': np.arange(len(voltage)), 'voltage': voltage,
                       'force': plant.force_trial(voltage)})
     for random in (False, True):
         for load in LOADS:
-            voltage = sequences.random_steps(LENGTH_STEPS, chance) if random else oscillation
+            voltage = sequences.random_steps(LENGTH_STEPS, rng) if random else oscillation
             length.append({'step': np.arange(len(voltage)), 'voltage': voltage,
                            'force': np.full(len(voltage), load),
                            'length': plant.length_trial(voltage, load)})
@@ -59,10 +59,10 @@ def arm_step_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]
              sequences.up_and_down)
 
     def record(recording):
-        chance = np.random.default_rng([seed, recording, 22])
+        rng = np.random.default_rng([seed, recording, 22])
         plant = Plant(seed, effects, recording=recording,
                       recording_time=HOLD * ARM_STEPS * len(kinds))
-        return [plant.arm_trial(kind(ARM_STEPS, chance)) for kind in kinds]
+        return [plant.arm_trial(kind(ARM_STEPS, rng)) for kind in kinds]
     return _recordings(record)
 
 
@@ -72,8 +72,8 @@ def arm_dynamic_tables(effects: Mapping[str, float], seed: int) -> dict[str, Tab
              sequences.long_holds)
 
     def record(recording):
-        chance = np.random.default_rng([seed, recording, 23])
-        runs = [kind(chance) for kind in kinds]
+        rng = np.random.default_rng([seed, recording, 23])
+        runs = [kind(rng) for kind in kinds]
         plant = Plant(seed, effects, heat_time_constant=BRISK, recording=recording,
                       recording_time=sequences.SAMPLING * sum(len(run) for run in runs))
         return [plant.arm_run(np.round(sequences.SAMPLING * np.arange(1, len(run) + 1), 3), run)
@@ -93,19 +93,19 @@ def _stack(trials: list[Table], columns: list[str]) -> Table:
     return {name: np.concatenate([table[name] for table in trials]) for name in columns}
 
 
-PROTOCOLS = {'bench': bench_tables, 'arm-steps': arm_step_tables,
-             'arm-dynamic': arm_dynamic_tables}
+EXPERIMENTS = {'bench': bench_tables, 'arm-steps': arm_step_tables,
+               'arm-dynamic': arm_dynamic_tables}
 
 
-def protocol_tables(name: str, effects: Mapping[str, float] | None = None,
-                    seed: int = 0) -> dict[str, Table]:
+def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
+                      seed: int = 0) -> dict[str, Table]:
     """
-    Carry a protocol out and return its tables.
+    Carry an experiment out and return its tables.
 
     Parameters
     ----------
     name : str
-        A key of `PROTOCOLS`.
+        A key of `EXPERIMENTS`.
     effects : mapping of str to float
         Strengths of hidden effects. On the bench only those of the wire itself act.
     seed : int
@@ -119,23 +119,23 @@ def protocol_tables(name: str, effects: Mapping[str, float] | None = None,
     Raises
     ------
     ParameterError
-        For a protocol or an effect that does not exist.
+        For an experiment or an effect that does not exist.
     """
-    if name not in PROTOCOLS:
+    if name not in EXPERIMENTS:
         raise ParameterError(f'laboratory: there is no protocol {name!r}; '
-                             f'there are {", ".join(PROTOCOLS)}')
-    return PROTOCOLS[name](effects or {}, seed)
+                             f'there are {", ".join(EXPERIMENTS)}')
+    return EXPERIMENTS[name](effects or {}, seed)
 
 
-def write_protocol(name: str, directory, effects: Mapping[str, float] | None = None,
-                   seed: int = 0) -> list[Path]:
+def write_experiment(name: str, directory, effects: Mapping[str, float] | None = None,
+                     seed: int = 0) -> list[Path]:
     """
-    Carry a protocol out and write its tables.
+    Carry an experiment out and write its tables.
 
     Parameters
     ----------
     name, effects, seed
-        As for `protocol_tables`.
+        As for `experiment_tables`.
     directory : str or Path
         Made where it is missing.
 
@@ -147,11 +147,11 @@ def write_protocol(name: str, directory, effects: Mapping[str, float] | None = N
     Raises
     ------
     ParameterError
-        For a protocol or an effect that does not exist.
+        For an experiment or an effect that does not exist.
     OSError
         If a file cannot be written.
     """
-    tables = protocol_tables(name, effects, seed)
+    tables = experiment_tables(name, effects, seed)
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     for file, columns in tables.items():

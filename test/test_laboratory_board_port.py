@@ -1,29 +1,40 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The port sim://bicep: its URL, its faults, and pyserial's interface to it."""
+"""The simulated board's port: its URL, its cable's faults, and the wall's clock."""
 
+import contextlib
 import threading
 import time
-from types import SimpleNamespace
 
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame
-from hysteresis_ros.bridge.simulated_board import SimulatedBoard, TICK
-from hysteresis_ros.bridge.simulated_cable import Cable
-from hysteresis_ros.bridge.simulation_url import parse_url, Simulation
-from hysteresis_ros.bridge.urlhandlers import protocol_sim
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory.board.cable import Cable
+from hysteresis_ros.laboratory.board.port import (
+    CableUnplugged, LARGEST_BACKLOG, LARGEST_LAG, PortClosed, SimulatedPort)
+from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
+from hysteresis_ros.laboratory.board.url import check_url, make_plant, parse_url, Simulation
 from hysteresis_ros.laboratory.plant import Plant
 import pytest
-import serial
-
-EFFECTS = {'supply_sag', 'payload_error'}
 
 
-def open_port(url, **options):
-    package = 'hysteresis_ros.bridge.urlhandlers'
-    if package not in serial.protocol_handler_packages:
-        serial.protocol_handler_packages.append(package)
-    return serial.serial_for_url(url, **options)
+class Clock:
+    """The wall's clock, moved by hand."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        """Return the time in s."""
+        return self.now
+
+
+@contextlib.contextmanager
+def open_port(url, clock=time.monotonic):
+    """Open a simulated port, and close it again."""
+    port = SimulatedPort(url, clock)
+    port.open()
+    yield port
+    port.close()
 
 
 def cable(**options):
@@ -36,15 +47,15 @@ def frames(data):
 
 
 def test_url_without_keys_is_a_perfect_arm_at_real_time():
-    assert parse_url('sim://bicep', EFFECTS) == Simulation()
-    assert parse_url('SIM://Bicep/', EFFECTS) == Simulation()
+    assert parse_url('sim://bicep') == Simulation()
+    assert parse_url('SIM://Bicep/') == Simulation()
 
 
-def test_every_key():
+def test_url_with_every_key_is_read():
     simulation = parse_url(
         'sim://bicep?speed=60&seed=3&recording=2&recording_time=100&time_constant=2&supply=24'
         '&drop=0.01&garbage=0.1&brownout=5&unplug_after=1&unplug_for=2&silent_after=3'
-        '&silent_for=4&deaf_after=5&deaf_for=6&supply_sag=0.4&payload_error=-1', EFFECTS)
+        '&silent_for=4&deaf_after=5&deaf_for=6&supply_sag=0.4&payload_error=-1')
     assert simulation == Simulation(60.0, 3, 2, 100.0, 2.0, 24.0, 0.01, 0.1, 5.0, 1.0, 2.0, 3.0,
                                     4.0, 5.0, 6.0, {'supply_sag': 0.4, 'payload_error': -1.0})
 
@@ -59,17 +70,17 @@ def test_every_key():
     ('sim://bicep?unplug_after=-1', 'from 0 to inf'), ('sim://bicep?supply_sag=x', 'supply_sag=x')])
 def test_urls_that_make_no_sense_say_so_in_one_line(url, words):
     with pytest.raises(ParameterError) as error:
-        parse_url(url, EFFECTS)
+        parse_url(url)
     assert words in str(error.value) and '\n' not in str(error.value)
 
 
 def test_strengths_that_no_effect_has_are_refused_before_opening():
     with pytest.raises(ParameterError, match='supply_sag'):
-        protocol_sim.check_url('sim://bicep?supply_sag=50')
+        check_url('sim://bicep?supply_sag=50')
 
 
 def test_effects_reach_the_arm():
-    clean, heavy = (protocol_sim.make_plant(parse_url(url, EFFECTS)).arm
+    clean, heavy = (make_plant(parse_url(url)).arm
                     for url in ('sim://bicep', 'sim://bicep?payload_error=1'))
     for arm in (clean, heavy):
         arm.advance(30.0, 4.0)
@@ -84,7 +95,7 @@ def test_perfect_cable_delivers_every_byte():
     assert wire.time == pytest.approx(2.0)
 
 
-def test_drop_loses_about_as_much_as_asked_in_both_directions():
+def test_drop_loses_the_given_share_in_both_directions():
     wire = cable(drop=0.1)
     for _ in range(1000):
         wire.tick()
@@ -126,7 +137,7 @@ def test_silence_begins_and_ends():
     assert not [time for time in times if 1000 < time < 3000]
 
 
-def test_deaf_board_lets_its_watchdog_bite():
+def test_watchdog_of_a_deaf_board_switches_off():
     wire = cable(deaf_after=1.0)
     wire.write(encode('enable', 1))
     for _ in range(3000 // TICK):
@@ -135,7 +146,7 @@ def test_deaf_board_lets_its_watchdog_bite():
     assert wire.board.duty == 0.0 and 'watchdog' in wire.board.faults
 
 
-def test_pulled_cable_takes_the_power_with_it():
+def test_unplugged_board_loses_its_power():
     wire = cable(unplug_after=1.0, unplug_for=1.0)
     wire.write(encode('enable', 1))
     for _ in range(1000 // TICK + 1):
@@ -148,106 +159,96 @@ def test_pulled_cable_takes_the_power_with_it():
     assert wire.board.time <= 2 * TICK
 
 
-def test_port_speaks_pyserial():
-    with open_port('sim://bicep?speed=20', timeout=2.0) as port:
-        assert port.is_open and port.out_waiting == 0
-        assert port.write(b'\n' + encode('hello', 7)) == 14
-        line = b''
-        while not line.startswith(b'board '):
-            line = port.readline()
-        port.flush()
-        port.reset_output_buffer()
-        port.reset_input_buffer()
-        assert port.in_waiting < 500
-        port.baudrate = 9600
-        port.timeout = 0
-        assert isinstance(port.read(1), bytes)
-        with pytest.raises(serial.SerialException, match='already'):
-            port.open()
-    with pytest.raises(serial.SerialException):
-        port.read(1)
-
-
 def test_waiting_read_can_be_ended():
     with open_port('sim://bicep?silent_after=0') as port:
         thread = threading.Timer(0.1, port.cancel_read)
         thread.start()
-        assert port.read(10 ** 6) == b''
+        assert port.read(10 ** 6, None) == b''
         thread.join()
 
 
+def test_closing_the_port_ends_a_waiting_read():
+    port = SimulatedPort('sim://bicep?silent_after=0')
+    port.open()
+    thread = threading.Timer(0.1, port.close)
+    thread.start()
+    with pytest.raises(PortClosed):
+        port.read(10 ** 6, None)
+    thread.join()
+
+
+def test_closed_port_takes_no_bytes():
+    port = SimulatedPort('sim://bicep')
+    with pytest.raises(PortClosed):
+        port.write(b'hello')
+    with pytest.raises(PortClosed):
+        port.read(1, 0.0)
+
+
 def test_writer_never_waits_for_a_reader_that_is_busy():
-    with open_port('sim://bicep?speed=1000', timeout=0) as port:
+    with open_port('sim://bicep?speed=1000') as port:
         with port._changed:
             thread = threading.Thread(target=port.write, args=(b'\n' + encode('enable', 1),))
             thread.start()
             thread.join(5.0)
-            assert not thread.is_alive() and not port._cable.board.enabled
-        port.read(1)
-        assert port._cable.board.enabled
+            assert not thread.is_alive() and not port.cable.board.enabled
+        port.read(1, 0.0)
+        assert port.cable.board.enabled
         with port._changed:
             thread = threading.Thread(target=port.write, args=(encode('disable', 1),))
             thread.start()
             thread.join(5.0)
-    assert not port._cable.board.enabled
+    assert not port.cable.board.enabled
 
 
 def test_read_waits_no_longer_than_its_timeout():
-    with open_port('sim://bicep?silent_after=0', timeout=0.05) as port:
+    with open_port('sim://bicep?silent_after=0') as port:
         before = time.monotonic()
-        assert port.read(10) == b''
+        assert port.read(10, 0.05) == b''
         assert time.monotonic() - before >= 0.05
 
 
-def test_time_follows_the_speed(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
-    port = open_port('sim://bicep?speed=50', timeout=0)
-    for _ in range(20):
-        now[0] += 0.05
-        assert port.read(10 ** 6)
-    assert port._cable.time == pytest.approx(50.0, abs=2 * TICK / 1000.0)
+def test_time_follows_the_speed():
+    clock = Clock()
+    with open_port('sim://bicep?speed=50', clock) as port:
+        for _ in range(20):
+            clock.now += 0.05
+            assert port.read(10 ** 6, 0.0)
+        assert port.cable.time == pytest.approx(50.0, abs=2 * TICK / 1000.0)
 
 
-def test_host_that_was_held_up_finds_the_arm_waiting(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
-    port = open_port('sim://bicep', timeout=0)
-    now[0] += 60.0
-    assert port.in_waiting
-    assert port._cable.time == pytest.approx(protocol_sim.LARGEST_LAG, abs=TICK / 1000.0)
+def test_host_that_was_held_up_finds_the_arm_waiting():
+    clock = Clock()
+    with open_port('sim://bicep', clock) as port:
+        clock.now += 60.0
+        assert port.in_waiting
+        assert port.cable.time == pytest.approx(LARGEST_LAG, abs=TICK / 1000.0)
 
 
-def test_arm_does_not_run_ahead_of_a_host_that_reads_slowly(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
-    port = open_port('sim://bicep?speed=1000', timeout=0)
-    for _ in range(1000):
-        now[0] += 0.01
-        assert port.in_waiting < protocol_sim.LARGEST_BACKLOG + 200
-    waiting = port.in_waiting
-    assert waiting >= protocol_sim.LARGEST_BACKLOG and len(port.read(10 ** 6)) == waiting
+def test_arm_does_not_run_ahead_of_a_host_that_reads_slowly():
+    clock = Clock()
+    with open_port('sim://bicep?speed=1000', clock) as port:
+        for _ in range(1000):
+            clock.now += 0.01
+            assert port.in_waiting < LARGEST_BACKLOG + 200
+        waiting = port.in_waiting
+        assert waiting >= LARGEST_BACKLOG and len(port.read(10 ** 6, 0.0)) == waiting
 
 
-def test_arm_lives_on_while_the_port_is_closed(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(protocol_sim, 'time', SimpleNamespace(monotonic=lambda: now[0]))
-    port = open_port('sim://bicep?unplug_after=1&unplug_for=3', timeout=0)
-    for _ in range(8):
-        now[0] += 0.1
-        port.read(100)
-    now[0] += 0.24
-    with pytest.raises(serial.SerialException, match='unplugged'):
-        port.read(100)
-    port.close()
-    now[0] += 1.0
-    with pytest.raises(serial.SerialException, match='unplugged'):
-        port.open()
-    now[0] += 2.5
+def test_arm_lives_on_while_the_port_is_closed():
+    clock = Clock()
+    port = SimulatedPort('sim://bicep?unplug_after=1&unplug_for=3', clock)
     port.open()
-    assert port._cable.board.time < 1000
-
-
-def test_wrong_url_is_refused_on_opening():
-    with pytest.raises(ParameterError, match='sped'):
-        open_port('sim://bicep?sped=1')
+    for _ in range(8):
+        clock.now += 0.1
+        port.read(100, 0.0)
+    clock.now += 0.24
+    with pytest.raises(CableUnplugged):
+        port.read(100, 0.0)
+    port.close()
+    clock.now += 1.0
+    with pytest.raises(CableUnplugged):
+        port.open()
+    clock.now += 2.5
+    port.open()
+    assert port.cable.board.time < 1000

@@ -38,7 +38,7 @@ class Effect:
         What it is.
     apply : callable
         ``apply(conditions, size, specimen, recording)`` changes the conditions: `size` is the
-        strength, the others are sources of chance for what belongs to the arm, and for what
+        strength, the others are random generators for what belongs to the arm, and for what
         differs from one recording to the next.
     signed : bool
         Whether a negative strength makes sense.

@@ -4,7 +4,7 @@
 
 import random
 
-from hysteresis_ros.bridge.simulated_board import TICK
+from hysteresis_ros.laboratory.board.simulated_board import TICK
 
 
 class Cable:
@@ -74,7 +74,7 @@ class Cable:
             self.received += self._to_host.randbytes(self._to_host.randint(1, 40))
         self.received += self._drop(data, self._to_host)
 
-    def _drop(self, data, chance):
+    def _drop(self, data, rng):
         if not self._simulation.drop:
             return data
-        return bytes(byte for byte in data if chance.random() >= self._simulation.drop)
+        return bytes(byte for byte in data if rng.random() >= self._simulation.drop)

@@ -1,0 +1,48 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of Sphinx: `make docs` builds these pages into build/docs."""
+
+from pathlib import Path
+import re
+import sys
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+project = 'hysteresis_ros'
+author = 'hysteresis_ros contributors'
+copyright = f'2026, {author}'
+release = re.search('<version>(.+)</version>',
+                    (ROOT / 'package.xml').read_text(encoding='utf-8')).group(1)
+
+extensions = ['sphinx.ext.autodoc', 'sphinx.ext.mathjax', 'myst_parser', 'numpydoc']
+html_theme = 'alabaster'
+html_theme_options = {'description': 'Hysteresis models for artificial muscles',
+                      'page_width': '1100px'}
+exclude_patterns = ['_build']
+
+# The pages need neither ROS nor a serial port.
+autodoc_mock_imports = [
+    'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
+    'rcl_interfaces', 'rclpy', 'rosbag2_py', 'rosgraph_msgs', 'sensor_msgs', 'serial', 'std_msgs',
+    'std_srvs']
+autodoc_member_order = 'bysource'
+autodoc_typehints = 'none'      # the docstrings give the types
+numpydoc_class_members_toctree = False
+numpydoc_show_class_members = False
+# Anchors of headings, to which the README links.
+myst_heading_anchors = 3
+
+
+def take_readme(app, name, source):
+    """Make the README the page `readme`, with its links as they are from this folder."""
+    if name == 'readme':
+        text = (ROOT / 'README.md').read_text(encoding='utf-8')
+        source[0] = re.sub(r'\]\(docs/', '](', re.sub(r'\]\((config/)', r'](../\1', text))
+    else:
+        source[0] = source[0].replace('](../README.md', '](readme.md')
+
+
+def setup(app):
+    """Register what this file adds to Sphinx."""
+    app.connect('source-read', take_readme)
