@@ -82,6 +82,8 @@ setup(
         'pyserial>=3.5',
         'PyYAML>=6.0.1',
         'joblib>=1.3',
+        'numba>=0.59',
+        'threadpoolctl>=3.1',
         'tqdm>=4.64',
     ],
     extras_require={

@@ -29,7 +29,7 @@ def package(root, tmp_path):
     kernels = folder / 'hysteresis_ros' / 'kernels'
     kernels.mkdir(parents=True)
     (folder / 'hysteresis_ros' / '__init__.py').touch()
-    for name in ('__init__.py', 'jit.py', 'cache_folder.py'):
+    for name in ('__init__.py', 'jit.py', 'compiler.py', 'cache_folder.py'):
         shutil.copy(root / 'hysteresis_ros' / 'kernels' / name, kernels)
     (kernels / 'inner.py').write_text(INNER.format(2))
     (kernels / 'outer.py').write_text(OUTER)
@@ -90,6 +90,15 @@ def test_without_the_compiler_functions_are_plain_python(package, home):
     code = 'from hysteresis_ros.kernels.outer import outer\nprint(type(outer).__name__, outer(2))'
     assert finished(start(package, code, NUMBA_DISABLE_JIT='1')) == ['function', '5']
     assert not (home[0] / '.cache').exists()
+
+
+def test_without_numba_functions_are_plain_python(package, home):
+    """Slow, and one line says what to do about it."""
+    code = ("import sys\nsys.modules['numba'] = None\n"
+            'from hysteresis_ros.kernels.outer import outer\nprint(type(outer).__name__, outer(2))')
+    output, errors = start(package, code).communicate(timeout=120)
+    assert output.split() == ['function', '5'], errors
+    assert errors.count('\n') == 1 and 'pip install numba' in errors
 
 
 def test_two_processes_that_compile_at_once_keep_both_results(package, home):
