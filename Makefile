@@ -48,7 +48,7 @@ COLCON := $(VENV)/bin/python -c 'import sys; from colcon_core.command import mai
 IN_WORKSPACE := export PATH="$$PWD/$(VENV)/bin:$$PATH"; \
 	$(if $(filter sourced,$(ROS)),,export AMENT_PREFIX_PATH="$$PWD/$(VENV)";) \
 	. ./$(WORKSPACE)/install/local_setup.sh; \
-	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)"
 
 .PHONY: help build demo test benchmark hidden clean force
 

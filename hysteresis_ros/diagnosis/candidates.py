@@ -5,12 +5,12 @@
 import dataclasses
 import math
 
-import joblib
 import numpy as np
 
 from hysteresis_ros.diagnosis.fit import beside, FIRST_EVALUATIONS, Fit
 from hysteresis_ros.diagnosis.parameters import starts_of, usual
 from hysteresis_ros.effects import catalogue, Effect
+from hysteresis_ros.workers import delayed, in_parallel
 
 # A recorded temperature [degC] that changes by less is a constant with noise on it.
 SMALLEST_CHANGE = 0.5
@@ -160,22 +160,12 @@ def consider(fitter, current: Fit, name: str) -> Candidate | None:
     return None if fit is None else finish(fitter, current, fit)
 
 
-def in_parallel(tasks, jobs):
-    """Return the results in order, one by one where joblib's backend in force can do that."""
-    try:
-        parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
-    except ValueError:
-        # Dask before joblib 1.4 gives all of them at the end.
-        parallel = joblib.Parallel(n_jobs=jobs)
-    return parallel(tasks)
-
-
 def consider_all(fitter, current: Fit, names, jobs: int, progress) -> list[Candidate]:
     """Try every effect named by itself, in parallel, best first; see `consider`."""
     # What takes longest begins first, so that no process has to wait for it: an arm in motion.
     names = sorted(names, key=lambda name: (
         not catalogue()[name].needs_transients, catalogue()[name].stage != 'mechanism'))
-    tasks = [joblib.delayed(consider)(fitter, current, name) for name in names]
+    tasks = [delayed(consider)(fitter, current, name) for name in names]
     return _ranked(progress(in_parallel(tasks, jobs), len(names)))
 
 
@@ -202,10 +192,10 @@ def consider_beside(fitter, current: Fit, looks, floor, jobs: int,
     list of Candidate, list of Fit
         What was fitted to the end, best first; what a few steps showed to be hopeless.
     """
-    tasks = [joblib.delayed(begin)(fitter, current.effects, starts) for starts in looks]
+    tasks = [delayed(begin)(fitter, current.effects, starts) for starts in looks]
     begun = [fit for fit in progress(in_parallel(tasks, jobs), len(tasks)) if fit is not None]
     good = hopeful(fitter, begun, floor)
-    tasks = [joblib.delayed(finish)(fitter, current, fit) for fit in good]
+    tasks = [delayed(finish)(fitter, current, fit) for fit in good]
     candidates = _ranked(progress(in_parallel(tasks, jobs), len(good)))
     return candidates, [fit for fit in begun if not any(fit is one for one in good)]
 
@@ -255,7 +245,7 @@ def changes_beside(problem, effects, candidates, jobs: int,
     """
     effects = [effect for effect in effects if not _takes_long(effect)]
     without = problem.simulate([*beside(problem.model.effects, effects), *effects])
-    tasks = [joblib.delayed(_changes)(problem, effects, candidate.effect, without)
+    tasks = [delayed(_changes)(problem, effects, candidate.effect, without)
              for candidate in candidates]
     return list(progress(in_parallel(tasks, jobs), len(tasks)))
 

@@ -18,6 +18,7 @@ from hysteresis_ros.diagnosis.fit import beside
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.search import Search
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.workers import one_blas_thread
 
 # Effects whose signatures agree more than this cannot be told apart.
 CONFUSED = 0.9
@@ -100,6 +101,7 @@ def _silent(iterable, total):
     return iterable
 
 
+@one_blas_thread()
 def diagnose(model, measurements, jobs: int = 1, seed: int = 0, progress=_silent) -> Diagnosis:
     """
     Find what the model is missing.

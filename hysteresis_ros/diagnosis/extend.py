@@ -13,6 +13,7 @@ from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.workers import one_blas_thread
 
 EVALUATIONS = 30
 
@@ -64,6 +65,7 @@ def rmse(model, measurements) -> float:
     return float(np.sqrt(squares / rows))
 
 
+@one_blas_thread()
 def extend(model, names, train, test=()) -> Extension:
     """
     Add effects and fit them together.

@@ -5,7 +5,7 @@
 import dataclasses
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize, special    # its stats take a second to import
 
 from hysteresis_ros.diagnosis.derivatives import Derivatives, differences
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
@@ -276,6 +276,6 @@ class Fitter:
         count = len(scores)
         factor = count / max(count - len(parameters), 1)
         covariance = factor * inverse @ (scores.T @ scores) @ inverse
-        half = stats.t.ppf(0.5 + level / 2.0, max(count - len(parameters), 1)) * np.sqrt(
+        half = special.stdtrit(max(count - len(parameters), 1), 0.5 + level / 2.0) * np.sqrt(
             np.maximum(np.diag(covariance), 0.0))
         return parameters.with_intervals(fit.vector, half)

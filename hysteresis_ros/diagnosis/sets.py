@@ -4,12 +4,12 @@
 
 import itertools
 
-import joblib
 import numpy as np
 
-from hysteresis_ros.diagnosis.candidates import finite, in_parallel
+from hysteresis_ros.diagnosis.candidates import finite
 from hysteresis_ros.diagnosis.fit import Fit
 from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.workers import delayed, in_parallel
 
 # Steps of what is begun, by whether rows are settled; others take longer.
 BEGUN_EVALUATIONS = {True: 8, False: 4}
@@ -70,5 +70,5 @@ def finish_sets(fitter, fits, jobs: int, progress) -> list[Fit]:
 
 
 def _all_finite(task, fitter, items, jobs, progress) -> list[Fit]:
-    tasks = [joblib.delayed(task)(fitter, item) for item in items]
+    tasks = [delayed(task)(fitter, item) for item in items]
     return [fit for fit in progress(in_parallel(tasks, jobs), len(items)) if fit is not None]
