@@ -13,7 +13,7 @@ import logging
 try:
     from hysteresis_ros.kernels.compiler import compile_and_keep
 except ModuleNotFoundError as error:
-    # Ubuntu 24.04 has no package of numba: all works without, but for the time that it takes.
+    # Not every system has a package of numba. All works without, but for the time that it takes.
     if error.name != 'numba':
         raise
     compile_and_keep = None
