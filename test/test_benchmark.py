@@ -62,7 +62,7 @@ def test_every_benchmark_runs(root, tmp_path):
 
 def test_the_file_holds_one_flat_mapping(monkeypatch, tmp_path, capsys):
     """Names to numbers, and the same on the terminal."""
-    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda quick: {'a_us': 2, 'b': 0.5}])
+    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda _: {'a_us': 2, 'b': 0.5}])
     assert main(str(tmp_path / 'benchmark.json')) == 0
     content = json.loads((tmp_path / 'benchmark.json').read_text(encoding='utf-8'))
     assert content == {'a_us': 2.0, 'b': 0.5}
@@ -71,7 +71,7 @@ def test_the_file_holds_one_flat_mapping(monkeypatch, tmp_path, capsys):
 
 def test_a_failing_benchmark_is_told_in_one_line(monkeypatch, tmp_path, capsys):
     """No file is written, and the exit status says so."""
-    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda quick: {'a': math.nan}])
+    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda _: {'a': math.nan}])
     assert main(str(tmp_path / 'benchmark.json')) == 1
     assert not (tmp_path / 'benchmark.json').exists()
     assert capsys.readouterr().err.count('\n') == 1
