@@ -12,7 +12,6 @@ leaves the muscle loose.
 import bisect
 
 import numpy as np
-from scipy import optimize
 
 from hysteresis_ros.bicep.bundle import USUAL_YIELD
 from hysteresis_ros.bicep.root import bracket, illinois
@@ -173,6 +172,7 @@ class Swing:
             return 1, 0.0
         if needed(last) >= 0.0:
             return last, 1.0
-        position = optimize.brentq(needed, 0.0, last, xtol=1e-9)
+        from scipy.optimize import brentq   # half a second that most models do not need
+        position = brentq(needed, 0.0, last, xtol=1e-9)
         k = min(int(position), last - 1)
         return k + 1, position - k

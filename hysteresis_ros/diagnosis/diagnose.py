@@ -11,6 +11,7 @@ from hysteresis_ros.diagnosis.bench_verdict import bench_verdict
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.verdict import Diagnosis
+from hysteresis_ros.workers import one_blas_thread
 
 __all__ = ['Diagnosis', 'diagnose']
 
@@ -21,6 +22,7 @@ def _silent(iterable, total):
 
 def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
              settings: Settings = Settings(), progress=_silent) -> Diagnosis:
+from hysteresis_ros.workers import one_blas_thread
     """
     Find what the model is missing.
 

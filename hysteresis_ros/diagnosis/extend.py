@@ -15,6 +15,7 @@ from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.workers import one_blas_thread
 
 EVALUATIONS = 30
 
@@ -66,6 +67,7 @@ def rmse(model, measurements) -> float:
     return float(np.sqrt(squares / rows))
 
 
+@one_blas_thread()
 def extend(model, names, train, test=()) -> Extension:
     """
     Add effects and fit them together.

@@ -23,6 +23,7 @@ from hysteresis_ros.identification.first_stage import first_stage_from_lengths
 from hysteresis_ros.identification.least_squares import WeightFit
 from hysteresis_ros.identification.operators import fit_operator
 from hysteresis_ros.model import MuscleModel
+from hysteresis_ros.workers import one_blas_thread
 
 LEVELS = (10, 20)
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
@@ -94,6 +95,7 @@ def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray
     return np.isin(column, list(trials))
 
 
+@one_blas_thread()
 def identify(length=None, force=None, *, force_trials=None, length_trials=None, geometry=None,
              levels: Sequence[int] = LEVELS, operator: str | None = None,
              anchored: bool = False, plain: bool = False) -> Identified:

@@ -32,6 +32,7 @@ from scipy import linalg, optimize
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.nonnegative import quick_weights, solve_nonnegative
 from hysteresis_ros.identification.weight_fit import WeightFit
+from hysteresis_ros.workers import one_blas_thread
 
 __all__ = ['Anchor', 'SLACK', 'STRENGTHS', 'WeightFit', 'fit_weights', 'folds_of',
            'quick_weights', 'solve_nonnegative']
@@ -76,6 +77,7 @@ def folds_of(groups: np.ndarray) -> list:
     return [np.isin(np.arange(len(groups)), part) for part in blocks]
 
 
+@one_blas_thread()
 def fit_weights(
         rows: np.ndarray, target: np.ndarray, *, groups: Optional[np.ndarray] = None,
         scale: Optional[np.ndarray] = None, penalty: Optional[np.ndarray] = None,

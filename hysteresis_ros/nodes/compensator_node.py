@@ -23,6 +23,7 @@ from std_srvs.srv import Trigger
 
 from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
 from hysteresis_ros.errors import HysteresisError, ParameterError, RangeError
+from hysteresis_ros.kernels.warm_up import warm_up_controller
 from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, WARN
 from hysteresis_ros.nodes.feedback import AngleFeedback
 from hysteresis_ros.nodes.parameters import (
@@ -73,6 +74,9 @@ class CompensatorNode(Node):
             self, self.PARAMETERS, check=_check, changed=self._configure)
         self._model = model or load_model(
             parameters['model_file'], parameters, self.get_logger())
+        # Before anything is subscribed: the first reference must not wait for a compiler.
+        self._ready_after = warm_up_controller(self._model)
+        self.get_logger().info(f'kernels ready in {self._ready_after:.1f} s')
         self._controller = self._model.controller(arm=True)
         self._integral = AngleFeedback()
         self._timer = None
@@ -226,7 +230,8 @@ class CompensatorNode(Node):
         return {'references received': self._received, 'setpoints published': self._published,
                 'references refused': self._refused, 'setpoints repeated': self._repeated,
                 'feedback corrections': self._corrections,
-                'feedback correction [rad]': self._integral.correction}
+                'feedback correction [rad]': self._integral.correction,
+                'kernels ready after [s]': self._ready_after}
 
 
 def _check(values):

@@ -21,6 +21,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.kernels.warm_up import warm_up_observer
 from hysteresis_ros.nodes.diagnostics import Diagnostics, WARN
 from hysteresis_ros.nodes.parameters import GEOMETRY, MODEL, NAMES, Parameters, Spec
 from hysteresis_ros.nodes.qos import MEASUREMENTS
@@ -56,6 +57,9 @@ class MonitorNode(Node):
         parameters = self._parameters = Parameters(
             self, self.PARAMETERS, check=BicepGeometry.from_mapping)
         model = model or load_model(parameters['model_file'], parameters, self.get_logger())
+        # Before anything is subscribed: the first sample must not wait for a compiler.
+        self._ready_after = warm_up_observer(model)
+        self.get_logger().info(f'kernels ready in {self._ready_after:.1f} s')
         self._observer = model.observer()
         self._voltage = self._ambient = self._residual = math.nan
         self._start = self._time = self._fine_until = None
@@ -128,7 +132,8 @@ class MonitorNode(Node):
 
     def _values(self):
         return {'angles received': self._measured, 'angles predicted': self._predicted,
-                'applied voltage [V]': self._voltage, 'residual [rad]': self._residual}
+                'applied voltage [V]': self._voltage, 'residual [rad]': self._residual,
+                'kernels ready after [s]': self._ready_after}
 
 
 def main(args=None) -> int:
