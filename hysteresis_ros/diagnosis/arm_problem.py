@@ -47,9 +47,6 @@ class ArmProblem(Problem):
             inputs: list[np.ndarray] = []
             base = simulator.run(effects, inputs)
             moved = simulator.run([*effects, Offset(size=step)])
-            areas = np.concatenate([
-                np.apply_along_axis(lambda column: np.interp(
-                    np.arange(count), chosen, column), 0, preisach_rows(stage.nodes, u, True))
-                for u, chosen, count in inputs])
+            areas = np.concatenate([preisach_rows(stage.nodes, u, True) for u in inputs])
             columns.append((((moved - base) / step)[:, None] * areas)[rows])
         return np.concatenate(columns)

@@ -4,20 +4,20 @@
 
 import math
 
-from .jit import jit
 from .layout import (
     DIRECTION, HIGH, INPUT, LOW, LOWER, OUTPUT, SATURATED, TABLE, TOLERANCE, UPPER)
+from .lean import lean
 
 SLOPE, INTERCEPT = TABLE, TABLE + 1
 
 
-@jit
+@lean
 def at(table, u):
     """Return the output at an input inside the range."""
     return table[INTERCEPT] + table[SLOPE] * u
 
 
-@jit
+@lean
 def reset(table, memory):
     """Go back to the lower end of the range."""
     memory[INPUT] = table[LOWER]
@@ -25,7 +25,7 @@ def reset(table, memory):
     memory[SATURATED] = memory[DIRECTION] = 0.0
 
 
-@jit
+@lean
 def step(table, memory, u):
     """Commit an input and return the output."""
     memory[SATURATED] = 0.0 if table[LOWER] <= u <= table[UPPER] else 1.0
@@ -38,7 +38,7 @@ def step(table, memory, u):
     return memory[OUTPUT]
 
 
-@jit
+@lean
 def peek(table, memory, u):
     """Return the output that `step` would give, and commit nothing."""
     if math.isnan(u):
@@ -46,7 +46,7 @@ def peek(table, memory, u):
     return at(table, min(max(u, table[LOWER]), table[UPPER]))
 
 
-@jit
+@lean
 def solve(table, memory, y):
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
     low, high, tolerance = table[LOW], table[HIGH], table[TOLERANCE]

@@ -7,9 +7,10 @@ import numpy as np
 from . import linear, play, preisach
 from .jit import jit
 from .layout import INPUT, KIND, OUTPUT, PLAY, PREISACH
+from .lean import lean
 
 
-@jit
+@lean
 def reset(table, memory):
     """Forget the history."""
     if table[KIND] == PREISACH:
@@ -20,7 +21,7 @@ def reset(table, memory):
         linear.reset(table, memory)
 
 
-@jit
+@lean
 def step(table, memory, u):
     """Commit an input and return the output."""
     if table[KIND] == PREISACH:
@@ -30,7 +31,7 @@ def step(table, memory, u):
     return linear.step(table, memory, u)
 
 
-@jit
+@lean
 def peek(table, memory, u):
     """Return the output that `step` would give, and commit nothing."""
     if table[KIND] == PREISACH:
@@ -40,7 +41,7 @@ def peek(table, memory, u):
     return linear.peek(table, memory, u)
 
 
-@jit
+@lean
 def solve(table, memory, y):
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
     if table[KIND] == PREISACH:
@@ -63,13 +64,13 @@ def simulate(table, memory, inputs):
     return outputs
 
 
-@jit
+@lean
 def last_input(table, memory):
     """Return the input committed last."""
     return memory[INPUT]
 
 
-@jit
+@lean
 def last_output(table, memory):
     """Return the output for it."""
     return memory[OUTPUT]

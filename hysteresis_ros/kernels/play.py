@@ -15,12 +15,13 @@ import numpy as np
 from .jit import jit
 from .layout import (
     DIRECTION, HIGH, INPUT, LOW, LOWER, MEMORY, OUTPUT, SATURATED, SIGN, TABLE, TOLERANCE, UPPER)
+from .lean import lean
 
 PLAYS, BENDS, BIAS = range(TABLE, TABLE + 3)
 RADII = TABLE + 3
 
 
-@jit
+@lean
 def moved(place, u, radius):
     """Return the place of a play after a movement of its input."""
     if place < u - radius:
@@ -53,7 +54,7 @@ def follow(inputs, radius, place):
     return course
 
 
-@jit
+@lean
 def total(table, memory, u):
     """Return the weighted sum of the plays after a movement to an input inside the range."""
     plays = int(table[PLAYS])
@@ -63,7 +64,7 @@ def total(table, memory, u):
     return x
 
 
-@jit
+@lean
 def bend(table, x):
     """Return the output for a weighted sum."""
     bends = int(table[BENDS])
@@ -76,7 +77,7 @@ def bend(table, x):
     return y
 
 
-@jit
+@lean
 def unbend(table, y):
     """Return the weighted sum that gives an output."""
     bends = int(table[BENDS])
@@ -90,7 +91,7 @@ def unbend(table, y):
             + (y - table[curve + 2 * bends + k - 1]) / table[curve + 3 * bends + k - 1])
 
 
-@jit
+@lean
 def reset(table, memory):
     """Forget the history: the input came down to the lower end from far above."""
     for k in range(int(table[PLAYS])):
@@ -100,7 +101,7 @@ def reset(table, memory):
     memory[OUTPUT] = bend(table, total(table, memory, table[LOWER]))
 
 
-@jit
+@lean
 def step(table, memory, u):
     """Commit an input and return the output."""
     memory[SATURATED] = 0.0 if table[LOWER] <= u <= table[UPPER] else 1.0
@@ -115,7 +116,7 @@ def step(table, memory, u):
     return memory[OUTPUT]
 
 
-@jit
+@lean
 def peek(table, memory, u):
     """Return the output that `step` would give, and commit nothing."""
     if math.isnan(u):
@@ -123,7 +124,7 @@ def peek(table, memory, u):
     return bend(table, total(table, memory, min(max(u, table[LOWER]), table[UPPER])))
 
 
-@jit
+@lean
 def _starts(table, memory, k, rising):
     """
     Return the input at which a play begins to move, the end of the range after the last one.
@@ -138,7 +139,7 @@ def _starts(table, memory, k, rising):
     return min(memory[MEMORY + k] - table[RADII + k], memory[INPUT])
 
 
-@jit
+@lean
 def solve(table, memory, y):
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
     low, high, tolerance = table[LOW], table[HIGH], table[TOLERANCE]

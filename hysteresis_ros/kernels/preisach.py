@@ -12,16 +12,15 @@ is the Everett function E of `operators.everett`.
 Table, after what every table begins with: number of levels N, output with all relays down, span of
 the output, intervals per unit of the input; N + 1 nodes; half the weight on the diagonal and the
 reversible weight of each interval; for each cell (a, b) at a N + b corner, row, column and density
-of E. Memory: level at the present input, number of corners, then each corner with its level.
+of E. Memory: level at the present input, number of corners, each corner with its level,
+and room to thin them out.
 """
 
 import math
 
-import numpy as np
-
-from .jit import jit
 from .layout import (
     DIRECTION, INPUT, LOWER, MEMORY, OUTPUT, SATURATED, SIGN, TABLE, TOLERANCE, UPPER)
+from .lean import lean
 
 LEVELS, BASE, SPAN, SCALE = range(TABLE, TABLE + 4)
 NODES = TABLE + 4
@@ -32,13 +31,18 @@ CORNERS = MEMORY + 2
 _WALK = 8
 
 
-@jit
+def memory_size(corners: int) -> int:
+    """Return how many entries a memory needs for a number of corners, and to thin them out."""
+    return CORNERS + (corners + 2) * 9 // 4 + 1
+
+
+@lean
 def capacity(memory):
-    """Return how many corners a memory has room for; one more is made for a moment."""
-    return (len(memory) - CORNERS) // 2 - 1
+    """Return how many corners a memory of `memory_size` has room for; one more for a moment."""
+    return (len(memory) - CORNERS) * 4 // 9 - 2
 
 
-@jit
+@lean
 def reset(table, memory):
     """Forget the history: all relays down, input at the lower end."""
     # As if the input had come down from saturation.
@@ -49,7 +53,7 @@ def reset(table, memory):
     memory[DIRECTION] = 0.0
 
 
-@jit
+@lean
 def _commit(table, memory, u, level):
     memory[INPUT] = u
     memory[LEVEL] = level
@@ -57,7 +61,7 @@ def _commit(table, memory, u, level):
     memory[SATURATED] = 0.0
 
 
-@jit
+@lean
 def interval(table, u):
     """Return the interval of the grid that an input lies in; a node belongs to the one above."""
     levels = int(table[LEVELS])
@@ -74,19 +78,19 @@ def interval(table, u):
     return low
 
 
-@jit
+@lean
 def _halves(table):
     """Return the place of the half weights on the diagonal; the reversible ones follow."""
     return NODES + int(table[LEVELS]) + 1
 
 
-@jit
+@lean
 def _cell(table, a, b):
     levels = int(table[LEVELS])
     return NODES + 1 + 3 * levels + 4 * (a * levels + b)
 
 
-@jit
+@lean
 def everett(table, alpha, beta):
     """Return E at one point, first node <= beta <= alpha <= last node."""
     halves = _halves(table)
@@ -102,7 +106,7 @@ def everett(table, alpha, beta):
             + q * (table[cell + 2] + table[halves + b] * q))
 
 
-@jit
+@lean
 def _root(rest, slope, bend, width):
     """Return d in [0, width] with slope d + bend d^2 = rest; all arguments non-negative."""
     if rest <= 0.0:
@@ -113,7 +117,7 @@ def _root(rest, slope, bend, width):
     return rest / denominator if rest < width * denominator else width
 
 
-@jit
+@lean
 def find_alpha(table, target, beta, tolerance):
     """
     Solve E(alpha, beta) = target for the smallest alpha.
@@ -168,7 +172,7 @@ def find_alpha(table, target, beta, tolerance):
     return table[NODES + low] + p, start + p * (slope + half * p)
 
 
-@jit
+@lean
 def find_beta(table, target, alpha, tolerance):
     """Solve E(alpha, beta) = target for the largest beta; see `find_alpha`."""
     if target <= tolerance:
@@ -204,7 +208,7 @@ def find_beta(table, target, alpha, tolerance):
     return x - q, start + q * (slope + half * q)
 
 
-@jit
+@lean
 def beyond(entries, offset, depth, bound, rising):
     """
     Return how many corners survive a movement up (down) to a bound.
@@ -243,7 +247,7 @@ def beyond(entries, offset, depth, bound, rising):
     return depth
 
 
-@jit
+@lean
 def trace(table, memory, u):
     """
     Follow the memory to an input strictly inside the range.
@@ -289,7 +293,7 @@ def trace(table, memory, u):
     return level - everett(table, corner, u), depth, turned
 
 
-@jit
+@lean
 def step(table, memory, u):
     """Commit an input and return the output; see `HysteresisOperator.step`."""
     if table[LOWER] < u < table[UPPER]:
@@ -314,7 +318,7 @@ def step(table, memory, u):
     return memory[OUTPUT]
 
 
-@jit
+@lean
 def peek(table, memory, u):
     """Return the output that `step` would give, and commit nothing."""
     if table[LOWER] < u < table[UPPER]:
@@ -324,7 +328,7 @@ def peek(table, memory, u):
     return table[BASE] if u <= table[LOWER] else memory[OUTPUT]
 
 
-@jit
+@lean
 def solve(table, memory, y):
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
     sign, base, tolerance = table[SIGN], table[BASE], table[TOLERANCE]
@@ -367,7 +371,7 @@ def solve(table, memory, y):
     return u, base + sign * (level - fall), saturated
 
 
-@jit
+@lean
 def recall(table, memory, u):
     """Compute the levels of corners that were put into the memory, and commit an input on top."""
     memory[CORNERS], memory[CORNERS + 1] = table[UPPER], table[SPAN]
@@ -388,7 +392,7 @@ def recall(table, memory, u):
     _commit(table, memory, u, level)
 
 
-@jit
+@lean
 def thin(table, memory, depth):
     """
     Merge neighbouring steps of a staircase that has become too long.
@@ -417,22 +421,17 @@ def thin(table, memory, depth):
     pairs = (count - 1) // 2
     # Step k reaches from maximum k down to maximum k + 1 and has minimum k.
     first = CORNERS + 4
-    rectangles = np.empty(pairs)
+    sizes = len(memory) - pairs
+    for n in range(pairs):
+        memory[sizes + n] = _rectangle(table, memory, first + 8 * n)
+    heap_sort(memory, sizes, pairs)
+    merges = pairs * 4 // 5
+    largest = memory[sizes + merges - 1]
+    into = first
     for n in range(pairs):
         k = first + 8 * n
-        size = (memory[k] - memory[k + 4]) * (memory[k + 6] - memory[k + 2])
-        # Inside one cell the weight is uniform and its mean is exact: such steps come first.
-        uniform = (interval(table, memory[k]) == interval(table, memory[k + 8])
-                   and interval(table, memory[k + 2]) == interval(table, memory[k + 6]))
-        rectangles[n] = -1.0 / (1.0 + size) if uniform else size
-    merged = np.zeros(pairs, dtype=np.bool_)
-    for n in np.argsort(rectangles, kind='mergesort')[:pairs * 4 // 5]:
-        merged[n] = True
-    into = first
-    for n in range(pairs + 1):
-        k = first + 8 * n
-        stop = min(k + 8, CORNERS + 2 * depth)
-        if n < pairs and merged[n]:
+        if merges > 0 and _rectangle(table, memory, k) <= largest:
+            merges -= 1
             share = (memory[k + 4] - memory[k + 8]) / (memory[k] - memory[k + 8])
             low = memory[k + 2] + share * (memory[k + 6] - memory[k + 2])
             level = memory[k + 1] - everett(table, memory[k], low)
@@ -440,10 +439,46 @@ def thin(table, memory, depth):
             memory[into + 2], memory[into + 3] = low, level
             into += 4
         else:
-            # The last steps and what is above them stay as they are.
-            if n == pairs:
-                stop = CORNERS + 2 * depth
-            for place in range(k, stop):
+            for place in range(k, k + 8):
                 memory[into] = memory[place]
                 into += 1
+    # The last steps stay as they are.
+    for place in range(first + 8 * pairs, CORNERS + 2 * depth):
+        memory[into] = memory[place]
+        into += 1
     return (into - CORNERS) // 2
+
+
+@lean
+def _rectangle(table, memory, k):
+    """Return the size by which steps are merged: that of the rectangle between two of them."""
+    # Inside one cell the weight is uniform and its mean is exact: such steps come first.
+    size = (memory[k] - memory[k + 4]) * (memory[k + 6] - memory[k + 2])
+    uniform = (interval(table, memory[k]) == interval(table, memory[k + 8])
+               and interval(table, memory[k + 2]) == interval(table, memory[k + 6]))
+    return -1.0 / (1.0 + size) if uniform else size
+
+
+@lean
+def heap_sort(values, start, count):
+    """Sort `count` values from a place on, in place: a kernel that steps must not allocate."""
+    for parent in range(count // 2 - 1, -1, -1):
+        _sift(values, start, parent, count)
+    for end in range(count - 1, 0, -1):
+        values[start], values[start + end] = values[start + end], values[start]
+        _sift(values, start, 0, end)
+
+
+@lean
+def _sift(values, start, parent, end):
+    """Let a value sink to its place in a heap whose largest is on top."""
+    value = values[start + parent]
+    child = 2 * parent + 1
+    while child < end:
+        if child + 1 < end and values[start + child + 1] > values[start + child]:
+            child += 1
+        if values[start + child] <= value:
+            break
+        values[start + parent] = values[start + child]
+        parent, child = child, 2 * child + 1
+    values[start + parent] = value

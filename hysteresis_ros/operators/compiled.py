@@ -94,12 +94,16 @@ class CompiledOperator(HysteresisOperator):
         """Return how many entries of the memory mean something."""
         return len(self.memory)
 
+    def move_memory(self, memory: np.ndarray) -> None:
+        """Keep what is remembered in another array from now on, shape (Q,)."""
+        used = self._used()
+        memory[:used] = self.memory[:used]
+        self.memory = memory
+
     def __deepcopy__(self, memo: dict) -> 'CompiledOperator':
         """Return an operator with a memory of its own; what never changes is shared."""
         other = copy.copy(self)
-        other.memory = np.empty(len(self.memory))
-        used = self._used()
-        other.memory[:used] = self.memory[:used]
+        other.move_memory(np.empty(len(self.memory)))
         return other
 
     def __getstate__(self) -> dict[str, Any]:

@@ -73,7 +73,7 @@ class Preisach(CompiledOperator):
             np.concatenate((self.weights, self.reversible)), 'Preisach weights')
         self._tilted: dict[float, np.ndarray] = {}
         self.table = self._packed(self.reversible)
-        self.memory = np.empty(kernel.CORNERS + 2 * (MOST_CORNERS + 1))
+        self.memory = np.empty(kernel.memory_size(MOST_CORNERS))
         self.reset()
         for array in (self.nodes, self.weights, self.reversible):
             array.flags.writeable = False
