@@ -71,26 +71,6 @@ def test_inverse_gives_the_reference_that_can_be_reached(inputs, share, sign, ex
     for beyond, end in ((high + 0.1, high), (low - 0.1, low)):
         found = operator.invert(beyond)
         assert found.saturated and found.output == pytest.approx(end, abs=1e-11 * full)
-    for increasing in (True, False):
-        branch = operator.branch(increasing)
-        level = branch.values[0] + share * (branch.values[-1] - branch.values[0])
-        assert branch.value(branch.inverse(level)) == pytest.approx(level, abs=1e-11 * full)
-
-
-def test_branch_is_what_the_operator_follows():
-    operator = example()
-    operator.step(1.0)
-    rising, falling = operator.branch(True), operator.branch(False)
-    expected = {u: operator.peek(u) for u in np.linspace(-2.0, 3.0, 21)}
-    operator.step(-1.0)
-    for u, y in expected.items():
-        assert (rising if u >= 1.0 else falling).value(u) == y
-    assert rising.value(0.0) == expected[1.0]
-    for branch, u in ((rising, 1.5), (falling, 0.2)):
-        numeric = (branch.value(u + 1e-5) - branch.value(u - 1e-5)) / 2e-5
-        assert branch.slope(u) == pytest.approx(numeric, abs=1e-6)
-    assert rising.inverse([-9.0, 9.0]).tolist() == [1.0, 3.0]
-    assert falling.inverse([-9.0, 9.0]).tolist() == [-2.0, 1.0]
 
 
 def test_nothing_but_numbers_comes_out():

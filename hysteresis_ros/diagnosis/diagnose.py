@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Find the physical effects that a model is missing, or say why none can be named."""
 
-import dataclasses
-
 import numpy as np
 
 from hysteresis_ros.diagnosis.arm_verdict import arm_verdict
@@ -20,9 +18,9 @@ def _silent(iterable, total):
     return iterable
 
 
+@one_blas_thread()
 def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
              settings: Settings = Settings(), progress=_silent) -> Diagnosis:
-from hysteresis_ros.workers import one_blas_thread
     """
     Find what the model is missing.
 
@@ -57,8 +55,3 @@ from hysteresis_ros.workers import one_blas_thread
     if problem.refits:
         return bench_verdict(problem, settings, rng, jobs, progress)
     return arm_verdict(problem, settings, rng, progress)
-
-
-def with_settings(**changes) -> Settings:
-    """Return the settings with some of them changed."""
-    return dataclasses.replace(Settings(), **changes)

@@ -55,7 +55,7 @@ class Problem:
         self.settled = all(m.settled for m in measurements)
         rows = sum(m.rows for m in measurements)
         self.stride = max(1, rows // MOST_ROWS[self.kind])
-        self.simulators = [Simulator(model, m, self.stride) for m in measurements]
+        self.simulators = [Simulator(model, m) for m in measurements]
         self.chosen = [np.arange(0, m.rows, self.stride) for m in measurements]
         self.measured = self.pick([m.column(m.response) for m in measurements])
         self.noise = max(sensor_resolution(m) for m in measurements)

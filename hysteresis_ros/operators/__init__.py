@@ -6,7 +6,6 @@ from .additive import Additive
 from .areas import signed_areas, signed_lengths
 from .base import HysteresisOperator, Inversion, operator_from_dict
 from .bouc_wen import BoucWen
-from .branch import Branch, PiecewiseQuadratic
 from .cascade import Cascade, linear_drive_model, linear_model
 from .coupled import Coupled, coupled_from_dict
 from .everett import cell_areas, cells
@@ -17,13 +16,11 @@ from .preisach import Preisach
 __all__ = [
     'Additive',
     'BoucWen',
-    'Branch',
     'Cascade',
     'Coupled',
     'HysteresisOperator',
     'Inversion',
     'Linear',
-    'PiecewiseQuadratic',
     'PrandtlIshlinskii',
     'Preisach',
     'cell_areas',

@@ -61,9 +61,9 @@ class Additive(Coupled):
         v, f = self.columns(inputs).T
         return load.simulate(f) - drive.simulate(v)
 
-    def _solve(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
-               slope_floors: Sequence[float]) -> tuple[float, float, bool]:
+    def _solve(self, y: float, coupled: Sequence[float],
+               dead_bands: Sequence[float]) -> tuple[float, float, bool]:
         drive, load = self.stages
         level = load.peek(coupled[0])
-        v, reached, saturated = drive.solve(level - y, dead_bands[0], slope_floors[0])
+        v, reached, saturated = drive.solve(level - y, dead_bands[0])
         return v, level - reached, saturated

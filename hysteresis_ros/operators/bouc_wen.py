@@ -26,7 +26,6 @@ from scipy.special import hyp2f1, poch, psi
 from .base import (
     HysteresisOperator, LARGEST, input_range, memory, number, one_sign,
     resolution, take)
-from .branch import Branch
 from ..errors import ParameterError
 
 # exp(-40) is below the spacing of floats at 1: from there on w is 1.
@@ -204,10 +203,6 @@ class BoucWen(HysteresisOperator):
         u = min(max(u, self.lower), self.upper)
         return self._at(u, self._turned(u))
 
-    def branch(self, increasing: bool) -> 'BoucWenBranch':
-        """Return the smooth curve from the present input to the end of the range, one way."""
-        return BoucWenBranch(self, increasing)
-
     def _solve(self, y: float) -> tuple[float, float, bool]:
         low, high = self._ends
         saturated = not low - self._tolerance <= y <= high + self._tolerance
@@ -278,57 +273,3 @@ class BoucWen(HysteresisOperator):
         """Build the operator from what `to_dict` returned; ParameterError if it cannot be."""
         names = ('stiffness', 'gain', 'rate', 'shape', 'exponent', 'bias', 'lower', 'upper')
         return cls(*(take(parameters, name, 'Bouc-Wen operator') for name in names))
-
-
-class BoucWenBranch(Branch):
-    """
-    The branch of a Bouc-Wen operator from its memory at the time of the call.
-
-    Parameters
-    ----------
-    operator : BoucWen
-        The operator; its later steps do not change the branch.
-    increasing : bool
-        Whether the input moves up along the branch.
-
-    """
-
-    def __init__(self, operator: BoucWen, increasing: bool) -> None:
-        # A copy of its own, because the operator goes on.
-        self._operator = BoucWen.from_dict(operator.to_dict())
-        self._operator.restore(operator.save())
-        ends = ((operator.input, operator.upper) if increasing
-                else (operator.lower, operator.input))
-        self.knots = np.unique(ends)
-        self.values = np.array([self._operator.peek(u) for u in self.knots])
-        self.increasing = increasing
-
-    def value(self, u: np.ndarray | float) -> np.ndarray | float:
-        """Return the output at inputs; beyond the ends of the branch, that of the nearer end."""
-        u = np.clip(np.asarray(u, dtype=float), self.knots[0], self.knots[-1])
-        return np.vectorize(self._operator.peek, otypes=[float])(u)[()]
-
-    def slope(self, u: np.ndarray | float) -> np.ndarray | float:
-        """Return d output / d input."""
-        operator = self._operator
-        side = 1.0 if self.increasing else -1.0
-
-        def scalar(place: float) -> float:
-            return operator._slope(side * operator._turned(place))
-
-        u = np.clip(np.asarray(u, dtype=float), self.knots[0], self.knots[-1])
-        return np.vectorize(scalar, otypes=[float])(u)[()]
-
-    def inverse(self, y: np.ndarray | float) -> np.ndarray | float:
-        """Return the inputs nearest to the present one that give outputs, or come nearest."""
-        operator = self._operator
-        end = float(self.knots[-1] if self.increasing else self.knots[0])
-        start = operator.output
-        side = operator._sign if self.increasing else -operator._sign
-
-        def scalar(level: float) -> float:
-            if side * (level - start) <= 0.0 or end == operator.input:
-                return operator.input
-            return operator._seek(level, end)[0]
-
-        return np.vectorize(scalar, otypes=[float])(np.asarray(y, dtype=float))[()]

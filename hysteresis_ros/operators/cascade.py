@@ -80,32 +80,31 @@ class Cascade(Coupled):
             y = stage.simulate(x - y)
         return y
 
-    def _solve(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
-               slope_floors: Sequence[float]) -> tuple[float, float, bool]:
+    def _solve(self, y: float, coupled: Sequence[float],
+               dead_bands: Sequence[float]) -> tuple[float, float, bool]:
         """Invert the stages from the last to the first (Eqs. 13 and 14)."""
         stages, slack = self.stages, self._slack
         k = len(stages) - 1
-        drive, output, saturated = stages[k].solve(y, dead_bands[k], slope_floors[k])
+        drive, output, saturated = stages[k].solve(y, dead_bands[k])
         exact = True
         while k:
             target = coupled[k - 1] - drive
             k -= 1
-            drive, reached, beyond = stages[k].solve(target, dead_bands[k], slope_floors[k])
+            drive, reached, beyond = stages[k].solve(target, dead_bands[k])
             saturated = saturated or beyond
             exact = exact and -slack[k] <= reached - target <= slack[k]
         return drive, output if exact else self.peek((drive, *coupled)), saturated
 
-    def invert_force(self, force: float, dead_band: float = 0.0,
-                     slope_floor: float = 0.0) -> Inversion:
+    def invert_force(self, force: float, dead_band: float = 0.0) -> Inversion:
         """
         Find the drive for a force at resting length: the first stage's inverse (Eq. 12).
 
         Commit the drive with ``stages[0].step``: the later stages take no part.
         """
-        return self.stages[0].invert(force, dead_band, slope_floor)
+        return self.stages[0].invert(force, dead_band)
 
-    def invert_length(self, length: float, force: float, dead_bands: Sequence[float] = (),
-                      slope_floors: Sequence[float] = ()) -> Inversion:
+    def invert_length(self, length: float, force: float,
+                      dead_bands: Sequence[float] = ()) -> Inversion:
         """
         Find the drive for a length under a force, with two stages (Eqs. 13 and 14).
 
@@ -113,11 +112,11 @@ class Cascade(Coupled):
         ----------
         length, force : float
             References L_d and F_d.
-        dead_bands, slope_floors : sequence of float, length 2 or empty
-            Options of H1's and H2's inverse, see `HysteresisOperator.invert`.
+        dead_bands : sequence of float, length 2 or empty
+            Of H1's and H2's inverse, see `HysteresisOperator.invert`.
 
         """
-        return self.invert(length, (force,), dead_bands, slope_floors)
+        return self.invert(length, (force,), dead_bands)
 
 
 def linear_model(force_slope: float, force_intercept: float, length_slope: float,

@@ -77,8 +77,7 @@ class Coupled(abc.ABC):
         """
 
     def invert(self, y: float, coupled: Sequence[float] = (),
-               dead_bands: Sequence[float] = (),
-               slope_floors: Sequence[float] = ()) -> Inversion:
+               dead_bands: Sequence[float] = ()) -> Inversion:
         """
         Find the drive for an output and given coupled inputs; commit nothing.
 
@@ -88,8 +87,8 @@ class Coupled(abc.ABC):
             Requested output.
         coupled : sequence of float, length S - 1
             The inputs of the stages after the first.
-        dead_bands, slope_floors : sequence of float, length S or empty
-            Options of each stage's inverse, see `HysteresisOperator.invert`.
+        dead_bands : sequence of float, length S or empty
+            Of each stage's inverse, see `HysteresisOperator.invert`.
 
         Returns
         -------
@@ -99,10 +98,10 @@ class Coupled(abc.ABC):
             and output, flagged as saturated.
 
         """
-        return Inversion(*self.solve(y, coupled, dead_bands, slope_floors))
+        return Inversion(*self.solve(y, coupled, dead_bands))
 
-    def solve(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float] = (),
-              slope_floors: Sequence[float] = ()) -> tuple[float, float, bool]:
+    def solve(self, y: float, coupled: Sequence[float],
+              dead_bands: Sequence[float] = ()) -> tuple[float, float, bool]:
         """Return what `invert` does as a plain tuple, which is faster inside a control loop."""
         if len(coupled) != len(self.stages) - 1:
             raise ParameterError(f'{self.kind} model: {len(coupled)} coupled inputs given, '
@@ -110,11 +109,11 @@ class Coupled(abc.ABC):
         for value in (y, *coupled):
             if not -math.inf < value < math.inf:
                 return self.stages[0].input, self.output, True
-        return self._solve(y, coupled, dead_bands or self._off, slope_floors or self._off)
+        return self._solve(y, coupled, dead_bands or self._off)
 
     @abc.abstractmethod
-    def _solve(self, y: float, coupled: Sequence[float], dead_bands: Sequence[float],
-               slope_floors: Sequence[float]) -> tuple[float, float, bool]:
+    def _solve(self, y: float, coupled: Sequence[float],
+               dead_bands: Sequence[float]) -> tuple[float, float, bool]:
         """Solve for finite requests: drive, its output, whether out of reach."""
 
     def columns(self, inputs: np.ndarray) -> np.ndarray:
