@@ -19,4 +19,5 @@ def lean(function: Callable) -> Callable:
     options = getattr(compiled, 'targetoptions', None)
     if options is not None:
         options['_nrt'] = False
+        options['no_cfunc_wrapper'] = True
     return compiled

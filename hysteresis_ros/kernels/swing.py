@@ -9,6 +9,8 @@ jerk also stretches what is elastic in it, and an arm that swings faster than it
 leaves the muscle loose.
 """
 
+import math
+
 from . import grid, root
 from .arm import (
     INSIDE, LENGTH, LEVERAGE, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD, REST_SEARCH, SCALE, STRETCH,
@@ -52,8 +54,8 @@ def swing(arm, state, x, offset, factor, friction, dt):
     start = u = last_input(table, memory)
     k, share, here = _lacking(arm, state, u, x, offset, factor, drag, slope)
     if abs(here) > tolerance:
-        u = root.begin(motion, REST_SEARCH, u, here, here * motion[SWING_GAIN], -float('inf'),
-                       float('inf'), tolerance)
+        u = root.begin(motion, REST_SEARCH, u, here, here * motion[SWING_GAIN], -math.inf,
+                       math.inf, tolerance)
         while root.searching(motion, REST_SEARCH):
             k, share, missing = _lacking(arm, state, u, x, offset, factor, drag, slope)
             u = root.proceed(motion, REST_SEARCH, missing)

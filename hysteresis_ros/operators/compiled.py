@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the operators have in common whose steps are compiled: a table and a memory."""
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -102,7 +101,8 @@ class CompiledOperator(HysteresisOperator):
 
     def __deepcopy__(self, memo: dict) -> 'CompiledOperator':
         """Return an operator with a memory of its own; what never changes is shared."""
-        other = copy.copy(self)
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
         other.move_memory(np.empty(len(self.memory)))
         return other
 
