@@ -5,13 +5,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import optimize
 
 from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.identification.bouc_wen import fit_bouc_wen
 from hysteresis_ros.identification.least_squares import (
     SLACK, STRENGTHS, Anchor, WeightFit, fit_weights, quick_weights)
 from hysteresis_ros.operators import (
-    BoucWen, HysteresisOperator, Linear, Preisach, PrandtlIshlinskii, cell_areas, cells,
+    HysteresisOperator, Linear, Preisach, PrandtlIshlinskii, cell_areas, cells,
     signed_areas, signed_lengths)
 
 # The grid reaches at least this far beyond the data, as a share of the data's range.
@@ -84,7 +84,7 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
         slope, intercept = np.polyfit(np.concatenate([part[1:] for part in parts]), target, 1)
         return Linear(float(slope), float(intercept), low, high), None
     if kind == 'bouc-wen':
-        return _bouc_wen(parts, target, low, high), None
+        return fit_bouc_wen(parts, target, low, high, _kept(parts)), None
     raise IdentificationError(f'no operator of kind {kind!r}')
 
 
@@ -173,9 +173,14 @@ def thinned(drive: np.ndarray, most: int) -> np.ndarray:
     return np.flatnonzero(keep)
 
 
+def _kept(parts):
+    """Return the rows of each part that a search looks at, about `SEARCH_ROWS` of them."""
+    return [thinned(part, max(1, SEARCH_ROWS // len(parts))) for part in parts]
+
+
 def _fewer(parts, target):
-    """Return the inputs and outputs that a search looks at, of about `SEARCH_ROWS` rows."""
-    kept = [thinned(part, max(1, SEARCH_ROWS // len(parts))) for part in parts]
+    """Return the inputs and outputs of the rows kept."""
+    kept = _kept(parts)
     # Row n of a part is output n - 1 of its trial.
     starts = np.cumsum([0] + [len(part) - 1 for part in parts[:-1]])
     outputs = np.concatenate([start + rows[1:] - 1 for start, rows in zip(starts, kept)])
@@ -218,36 +223,3 @@ def _play(parts, target, low, high, levels, options):
     scale = np.maximum(np.ptp(rows, axis=0), 1e-12 * (high - low))
     fit = fit_weights(rows, target, scale=scale, sign=1, slack=SLACK, **options)
     return PrandtlIshlinskii(radii, fit.weights, fit.bias, low, high), fit
-
-
-def _bouc_wen(parts, target, low, high):
-    """Rate, shape and exponent by search; stiffness, gain and bias by linear least squares."""
-    parts, outputs = _fewer(parts, target)
-    inputs = np.concatenate([part[1:] for part in parts])
-
-    def fit(vector):
-        rate, shape, exponent = _bouc_wen_shape(vector, high - low)
-        states = []
-        for part in parts:
-            unit = BoucWen(0.0, 1.0, rate, shape, exponent, 0.0, low, high)
-            states.append(unit.simulate(part)[1:])
-        rows = np.column_stack([inputs, np.concatenate(states)])
-        scale = np.maximum(np.ptp(rows, axis=0), 1e-12 * (high - low))
-        return fit_weights(rows, outputs, scale=scale, sign=1, strength=1e-9)
-
-    # Slow to fast turning of the hidden state; the shape and the exponent matter less.
-    grid = [np.array([rate, 0.0, 0.0]) for rate in np.linspace(0.0, 5.0, 6)]
-    start = min(grid, key=lambda vector: fit(vector).rmse)
-    found = optimize.minimize(
-        lambda vector: fit(vector).rmse, start, method='Nelder-Mead',
-        options={'initial_simplex': start + np.vstack([np.zeros(3), 0.7 * np.eye(3)]),
-                 'maxfev': 100, 'xatol': 0.01, 'fatol': 0.0})
-    best = fit(found.x)
-    return BoucWen(float(best.weights[0]), float(best.weights[1]),
-                   *_bouc_wen_shape(found.x, high - low), float(best.bias), low, high)
-
-
-def _bouc_wen_shape(vector, span):
-    """Return rate, shape and exponent inside their ranges for any vector of three numbers."""
-    rate, shape, exponent = np.exp(np.clip(vector, -4.0, 6.0))
-    return float(rate / span), 0.5 + float(min(shape, 50.0)), 1.0 + float(min(exponent, 20.0))
