@@ -111,8 +111,8 @@ def fit_additive(length, levels: int = 20) -> tuple[Additive, WeightFit]:
                       groups=length.column('trial'), scale=np.concatenate(areas),
                       penalty=penalty, slack=SLACK)
     count = len(areas[0])
-    return Additive([Preisach(grids[1], fit.weights[count:]),
-                     Preisach(grids[0], fit.weights[:count], fit.bias)]), fit
+    return Additive(Preisach(grids[1], fit.weights[count:]),
+                    Preisach(grids[0], fit.weights[:count], fit.bias)), fit
 
 
 def fit_embedded_line(length, force, levels: int = 20) -> tuple[Cascade, WeightFit]:

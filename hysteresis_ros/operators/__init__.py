@@ -7,8 +7,8 @@ from .areas import signed_areas, signed_lengths
 from .base import HysteresisOperator, Inversion, operator_from_dict
 from .bouc_wen import BoucWen
 from .branch import Branch, PiecewiseQuadratic
-from .cascade import Cascade, linear_drive_model, linear_model
-from .coupled import Coupled, coupled_from_dict
+from .cascade import Cascade
+from .dead_zones import DeadZones
 from .everett import cell_areas, cells
 from .linear import Linear
 from .play import PrandtlIshlinskii
@@ -19,7 +19,7 @@ __all__ = [
     'BoucWen',
     'Branch',
     'Cascade',
-    'Coupled',
+    'DeadZones',
     'HysteresisOperator',
     'Inversion',
     'Linear',
@@ -28,9 +28,6 @@ __all__ = [
     'Preisach',
     'cell_areas',
     'cells',
-    'coupled_from_dict',
-    'linear_drive_model',
-    'linear_model',
     'operator_from_dict',
     'signed_areas',
     'signed_lengths',
