@@ -292,7 +292,7 @@ def test_wrong_usage_has_status_2(arguments, capsys):
 
 
 @pytest.mark.parametrize('command', ['identify', 'compare', 'predict', 'invert', 'simulate',
-                                     'effects'])
+                                     'effects', 'operators'])
 def test_every_command_explains_itself(command, capsys):
     with pytest.raises(SystemExit) as left:
         main([command, '--help'])

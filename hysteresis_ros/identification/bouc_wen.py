@@ -49,8 +49,8 @@ def starts() -> np.ndarray:
 
 
 def fit_bouc_wen(parts: Sequence[np.ndarray], target: np.ndarray, low: float, high: float,
-                 thin: Sequence[np.ndarray] | None = None,
-                 points: np.ndarray | None = None) -> BoucWen:
+                 thin: Sequence[np.ndarray] | None = None, points: np.ndarray | None = None,
+                 fitted: np.ndarray | None = None) -> BoucWen:
     """
     Fit a Bouc-Wen operator that rises with its input.
 
@@ -66,12 +66,15 @@ def fit_bouc_wen(parts: Sequence[np.ndarray], target: np.ndarray, low: float, hi
         Rows of each part that the search looks at, the first included; all of them by default.
     points : ndarray, shape (S, 4), optional
         Where the search starts; `starts` by default.
+    fitted : ndarray of bool, shape (n,), optional
+        Outputs to fit; the memory is carried through the others. Default: all.
 
     Returns
     -------
     BoucWen
     """
-    whole = _Problem(parts, target, low, high)
+    whole = _Problem(parts, target, low, high,
+                     np.ones(len(target), dtype=bool) if fitted is None else fitted)
     search = whole if thin is None else whole.thinned(thin)
     points = starts() if points is None else points
     costs = [float(np.sum(search.residual(point) ** 2)) for point in points]
@@ -83,8 +86,10 @@ def fit_bouc_wen(parts: Sequence[np.ndarray], target: np.ndarray, low: float, hi
 class _Problem:
     """The least squares problem, input and output brought to ranges of 1."""
 
-    def __init__(self, parts, target, low, high):
+    def __init__(self, parts, target, low, high, fitted):
         self.parts, self.target, self.low, self.high = parts, target, low, high
+        self.fitted = fitted
+        target = target[fitted]
         self.inputs = [(part - low) / (high - low) for part in parts]
         self.span = float(np.ptp(target)) or 1.0
         self.middle = float(np.mean(target))
@@ -95,10 +100,10 @@ class _Problem:
         first = np.cumsum([0] + [len(part) - 1 for part in self.parts[:-1]])
         kept = np.concatenate([start + some[1:] - 1 for start, some in zip(first, rows)])
         return _Problem([part[some] for part, some in zip(self.parts, rows)], self.target[kept],
-                        self.low, self.high)
+                        self.low, self.high, self.fitted[kept])
 
     def loops(self, vector):
-        """Return x for every row, shape (n,), and its factors of input and state."""
+        """Return x for the rows to fit, shape (n,), and its factors of input and state."""
         from hysteresis_ros.kernels.bouc_wen import follow
         rate, twice, exponent = 10.0 ** vector[:3]
         lag = vector[3]
@@ -107,7 +112,7 @@ class _Problem:
         return np.concatenate([
             (factors[0] * part
              + factors[1] * follow(part, 0.0, -1.0, rate, twice - 1.0, exponent, pole))[1:]
-            for part in self.inputs]), factors
+            for part in self.inputs])[self.fitted], factors
 
     def curve(self, x):
         """Return the columns of S, centred, the slopes that fit best, and the place of x."""
