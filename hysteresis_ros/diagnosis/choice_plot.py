@@ -30,7 +30,7 @@ def choice_figure(choice):
             axis.annotate(str(number), place, xytext=(4, 4), textcoords='offset points',
                           fontsize=8)
         axis.set_xscale('log')
-        axis.set_yscale('log')
+        axis.set_ylim(bottom=0.0)
         axis.set_xlabel(label, fontsize=9)
     axes[0, 0].set_ylabel(f'RMSE of the {choice.response} held out [% of its range]', fontsize=9)
     axes[0, 1].legend(fontsize=7, loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False,

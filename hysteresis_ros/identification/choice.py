@@ -3,11 +3,13 @@
 """
 Which operator describes a muscle best, and what it costs: operators side by side.
 
-Each is fitted anew with a part of the length table held out in turn: whole trials, because memory is
-wiped between them, or, of one trial alone, blocks of rows, through which the memory is carried. The
-paper's advice (Sec. VIII) is many parameters where accuracy counts and few where cost does, so the
-answer names the smallest error, and the fewest parameters whose error is not larger by more than its
-standard error over the parts held out.
+Each is fitted anew with a part of the length table held out in turn: whole trials, because memory
+is wiped between them, or, of one trial alone, blocks of rows, through which the memory is carried.
+The paper's advice (Sec. VIII) is many parameters where accuracy counts and few where cost does, so
+the answer names the smallest error, and the fewest parameters among those that cannot be told from
+it: whose error over the smallest one, as a mean logarithm over the parts held out, is at most its
+standard error above 0. Of ratios, because a part that has to be extrapolated would else outweigh
+all others.
 """
 
 import dataclasses
@@ -23,6 +25,8 @@ from hysteresis_ros.identification.timing import time_per_step
 
 # Rows of the length table that are looked at: about so many, and every turning point.
 MOST_ROWS = 3000
+# Errors below this share of the range are the same.
+EXACT = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,8 +39,8 @@ class Score:
     name : str
     held_out, fitted : float
         RMSE on rows held out, and on the rows of the same fits. Unit of the response.
-    mean_squares : ndarray, shape (folds,)
-        Mean square error on each part held out, times its share of all rows times `folds`.
+    parts : ndarray, shape (folds,)
+        RMSE on each part held out.
     parameters : int
         Numbers that the model stores.
     simulate_us, invert_us : float
@@ -46,7 +50,7 @@ class Score:
     name: str
     held_out: float
     fitted: float
-    mean_squares: np.ndarray
+    parts: np.ndarray
     parameters: int
     simulate_us: float
     invert_us: float
@@ -88,10 +92,6 @@ class Choice:
     parts: str
     folds: int
 
-    def standard_error(self, score: Score) -> float:
-        """Return the standard error of a score's mean square error above the best one's."""
-        return _standard_error(score.mean_squares - self.best.mean_squares)
-
     def to_json(self) -> dict:
         """Return plain types for JSON."""
         percent = 100.0 / self.span
@@ -101,7 +101,8 @@ class Choice:
             'folds': self.folds,
             'operators': [{
                 'operator': score.name, 'parameters': score.parameters,
-                'held_out': {'rmse': score.held_out, 'rmse_percent': percent * score.held_out},
+                'held_out': {'rmse': score.held_out, 'rmse_percent': percent * score.held_out,
+                             'parts': score.parts.tolist()},
                 'fitted': {'rmse': score.fitted, 'rmse_percent': percent * score.fitted},
                 'simulate_us': score.simulate_us, 'invert_us': score.invert_us}
                 for score in self.scores],
@@ -150,16 +151,17 @@ def compare_operators(length, force=None, chosen: list[Candidate] | None = None,
         raise IdentificationError(f'{length.source}: no operator could be fitted: {reasons}')
     scores.sort(key=lambda score: score.held_out)
     best = scores[0]
-    near = [score for score in scores
-            if np.mean(score.mean_squares - best.mean_squares)
-            <= _standard_error(score.mean_squares - best.mean_squares)]
+    span = float(np.ptp(table.column(table.response)))
+    near = [score for score in scores if _alike(score.parts, best.parts, EXACT * span)]
     return Choice(
         scores, left_out, best, min(near, key=lambda score: score.parameters), table.response,
-        float(np.ptp(table.column(table.response))), length.rows, table.rows, parts, len(masks))
+        span, length.rows, table.rows, parts, len(masks))
 
 
-def _standard_error(values: np.ndarray) -> float:
-    return float(np.std(values, ddof=1) / np.sqrt(len(values)))
+def _alike(errors: np.ndarray, smallest: np.ndarray, least: float) -> bool:
+    """Tell whether errors on the parts held out are within a standard error of the smallest."""
+    ratios = np.log(np.maximum(errors, least) / np.maximum(smallest, least))
+    return bool(np.mean(ratios) <= np.std(ratios, ddof=1) / np.sqrt(len(ratios)))
 
 
 def _reduced(length):
@@ -176,7 +178,7 @@ def _reduced(length):
 def _score(candidate, table, force, masks, parts):
     """Fit a candidate without each part in turn, and return its row of the table."""
     measured = table.column(table.response)
-    held_out, fitted, squares = 0.0, 0.0, []
+    held_out, fitted, errors = 0.0, 0.0, []
     for mask in masks:
         if parts == 'trials':
             fold = Fold(table.where(~mask), force, None)
@@ -187,11 +189,11 @@ def _score(candidate, table, force, masks, parts):
         square = (predicted - measured) ** 2
         held_out += float(np.sum(square[mask]))
         fitted += float(np.mean(square[~mask]))
-        squares.append(float(np.sum(square[mask])) * len(masks) / len(measured))
+        errors.append(float(np.sqrt(np.mean(square[mask]))))
     first = inputs_of(model, table)[0]
     simulate, invert = time_per_step(model.operator, first, _simulated(model, first))
     return Score(candidate.name, float(np.sqrt(held_out / len(measured))),
-                 float(np.sqrt(fitted / len(masks))), np.array(squares), model.parameters,
+                 float(np.sqrt(fitted / len(masks))), np.array(errors), model.parameters,
                  1e6 * simulate, 1e6 * invert)
 
 
