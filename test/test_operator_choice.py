@@ -136,6 +136,13 @@ def test_the_simplest_that_cannot_be_told_from_the_best_is_advised():
             off_by('large', large, best), off_by('small', wide, errors)])
         assert choice.best.name == 'large' and choice.simplest.name == advised
         assert choice.best.parts == pytest.approx(best)
+    plays = [PrandtlIshlinskii([0.0, 1.0], [1.0, 1.0], 0.0, 0.0, 6.0)]
+    # Alike in most parts, but a simpler one is better on the whole.
+    choice = compare_operators(table, None, [
+        off_by('large', large, best), off_by('small', plays, [0.1, 0.1, 0.1, 0.1, 0.9]),
+        off_by('smallest', wide, [0.3, 0.3, 0.3, 0.3, 0.5])])
+    assert [score.name for score in choice.scores] == ['large', 'smallest', 'small']
+    assert choice.simplest.name == 'large'
 
 
 def test_long_tables_keep_their_turning_points():

@@ -9,7 +9,7 @@ The paper's advice (Sec. VIII) is many parameters where accuracy counts and few 
 the answer names the smallest error, and the fewest parameters among those that cannot be told from
 it: whose error over the smallest one, as a mean logarithm over the parts held out, is at most its
 standard error above 0. Of ratios, because a part that has to be extrapolated would else outweigh
-all others.
+all others. What has a larger error than a model with no more parameters is never advised.
 """
 
 import dataclasses
@@ -152,7 +152,9 @@ def compare_operators(length, force=None, chosen: list[Candidate] | None = None,
     scores.sort(key=lambda score: score.held_out)
     best = scores[0]
     span = float(np.ptp(table.column(table.response)))
-    near = [score for score in scores if _alike(score.parts, best.parts, EXACT * span)]
+    near = [score for score in scores if _alike(score.parts, best.parts, EXACT * span)
+            and not any(other.held_out < score.held_out and other.parameters <= score.parameters
+                        for other in scores)]
     return Choice(
         scores, left_out, best, min(near, key=lambda score: score.parameters), table.response,
         span, length.rows, table.rows, parts, len(masks))

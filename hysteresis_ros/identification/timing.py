@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 # Rows that the inverse is timed on, after so many to warm up, and how often each time is taken.
-ROWS, WARM_UP, REPEATS = 300, 20, 3
+ROWS, WARM_UP, REPEATS = 300, 20, 10
 
 
 def time_per_step(operator, inputs: np.ndarray, outputs: np.ndarray) -> tuple[float, float]:
