@@ -78,6 +78,7 @@ setup(
     install_requires=[
         'numpy>=1.26',
         'scipy>=1.11',
+        'numba>=0.59',
         'matplotlib>=3.6',
         'pyserial>=3.5',
         'PyYAML>=6.0.1',
