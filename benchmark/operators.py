@@ -232,26 +232,23 @@ def noise_benchmarks(quick: bool) -> dict:
         Jitter of the voltage (of its range) per jitter of the reference (of its range): for
         single references at distances from a reversal, and for a constant reference with noise
         whose voltages are committed one after the other, as a compensator does; with the exact
-        inverse, with a dead band as wide as the noise from peak to peak, and with a slope floor
-        of a fifth of the mean slope. For the committed run also the root mean square error of
+        inverse, and with a dead band as wide as the noise from peak to peak. For the committed run also the root mean square error of
         the length against the reference without noise.
     """
-    band, floor = 8.0 * NOISE * LENGTH, 0.2 * LENGTH / (FORCES[1] - FORCES[0])
-    options = {'exact': ((), ()), 'dead_band': ((0.0, band), ()),
-               'slope_floor': ((), (0.0, floor))}
+    options = {'exact': (), 'dead_band': (0.0, 8.0 * NOISE * LENGTH)}
     results = {}
-    for name, (bands, floors) in options.items():
+    for name, bands in options.items():
         for distance in AFTER:
             place = f'{100.0 * distance:g}'.replace('.', '_')
             results[f'noise_gain_{name}_{place}_percent_after_reversal_ratio'], _ = _jitter(
-                distance * LENGTH, bands, floors, False, quick)
-        gain, error = _jitter(0.03 * LENGTH, bands, floors, True, quick)
+                distance * LENGTH, bands, False, quick)
+        gain, error = _jitter(0.03 * LENGTH, bands, True, quick)
         results[f'noise_gain_{name}_committed_ratio'] = gain
         results[f'noise_error_{name}_committed_of_full_scale'] = error
     return results
 
 
-def _jitter(distance, bands, floors, commit, quick):
+def _jitter(distance, bands, commit, quick):
     """Return the gain from reference to voltage noise, and the error of the length."""
     cascade = muscle()
     rng = np.random.default_rng(1)
@@ -263,7 +260,7 @@ def _jitter(distance, bands, floors, commit, quick):
         0.0, NOISE * LENGTH, QUICK_TRIES if quick else TRIES)
     volts, errors = [], []
     for length in references.tolist():
-        found = cascade.invert_length(length, force, bands, floors)
+        found = cascade.invert_length(length, force, bands)
         volts.append(found.input)
         errors.append(found.output - (peak - distance))
         if commit:

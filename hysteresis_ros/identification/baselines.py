@@ -111,31 +111,35 @@ def fit_additive(length, levels: int = 20) -> tuple[Additive, WeightFit]:
                       groups=length.column('trial'), scale=np.concatenate(areas),
                       penalty=penalty, slack=SLACK)
     count = len(areas[0])
-    return Additive([Preisach(grids[1], fit.weights[count:]),
-                     Preisach(grids[0], fit.weights[:count], fit.bias)]), fit
+    return Additive(Preisach(grids[1], fit.weights[count:]),
+                    Preisach(grids[0], fit.weights[:count], fit.bias)), fit
 
 
-def fit_embedded_line(length, force, levels: int = 20) -> tuple[Cascade, WeightFit]:
+def fit_embedded_line(length, force=None, levels: int = 20,
+                      fitted: np.ndarray | None = None) -> tuple[Cascade, WeightFit]:
     """
     Fit L = H5[F - a1 V - a0]: the two-stage model with a line for its first stage.
 
     Parameters
     ----------
     length, force : Measurement
-        The trials to fit.
+        The trials to fit; without a force table the line comes from the lengths.
     levels : int
         Levels of H5's grid.
+    fitted : ndarray of bool, shape (rows,), optional
+        Rows of the length table to fit; the memory is carried through the others.
 
     Returns
     -------
     Cascade, WeightFit
     """
-    line = fit_linear(force=force)
+    some = length if fitted is None else length.where(fitted)
+    line = fit_linear(force=force) if force is not None else fit_linear(some)
     drive = np.append(length.column(length.drive), _cold(length))
     first = Linear(line.k1, line.F0, float(drive.min()), float(drive.max()))
     parts = [loads - first.simulate(drives) for drives, loads in _parts(length)]
     second, fit = fit_operator('preisach', parts, length.column(length.response),
-                               length.column('trial'), levels)
+                               length.column('trial'), levels, fitted=fitted)
     return Cascade([first, second]), fit
 
 

@@ -67,11 +67,11 @@ class Recipe:
     anchored: bool
     plain: bool
 
-    def fit(self, parts, target, groups, levels, anchor, placed):
+    def fit(self, parts, target, groups, levels, anchor, placed, fitted=None):
         """Return operator and fit; the parameters are those of `fit_operator`."""
         options = {'strength': 0.0, 'reversible': False} if self.plain else {'placed': placed}
         return fit_operator(self.kind, parts, target, groups, levels,
-                            anchor=anchor if self.anchored else None, **options)
+                            anchor=anchor if self.anchored else None, fitted=fitted, **options)
 
 
 def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray:
@@ -98,7 +98,8 @@ def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray
 @one_blas_thread()
 def identify(length=None, force=None, *, force_trials=None, length_trials=None, geometry=None,
              levels: Sequence[int] = LEVELS, operator: str | None = None,
-             anchored: bool = False, plain: bool = False) -> Identified:
+             anchored: bool = False, plain: bool = False,
+             length_rows: np.ndarray | None = None) -> Identified:
     """
     Identify the muscle from bench tables.
 
@@ -122,6 +123,9 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
         Whether H1(0) is tied to the first force of the cold muscle and H2(0) to zero.
     plain : bool
         Whether to identify as the paper does: weights of the cells only, without regularisation.
+    length_rows : ndarray of bool, shape (rows,), optional
+        Rows of the length table to fit, of one trial that is held out by pieces: the memory is
+        carried through the others. Default: all rows of the trials to fit.
 
     Returns
     -------
@@ -163,13 +167,13 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     if length is not None:
         rows = choose_trials(length, length_trials, 'length')
         if operator == 'preisach' or not loaded:
-            length_fit = _drive_stage(model, length, rows, levels[1], recipe)
+            length_fit = _drive_stage(model, length, rows, levels[1], recipe, length_rows)
         else:
             if model.force_stage is None:
                 model.force_stage = _first_stage_from_lengths(model, length, rows, levels[0])
-            length_fit = _length_stage(model, length, rows, levels[1], recipe)
+            length_fit = _length_stage(model, length, rows, levels[1], recipe, length_rows)
     model.linear = fit_linear(
-        length and length.where(choose_trials(length, length_trials, 'length')),
+        length and length.where(_fitted_rows(length, length_trials, length_rows)),
         force and force.where(choose_trials(force, force_trials, 'force')))
     model.metrics = measure(model, force, force_trials, length, length_trials)
     model.provenance = _provenance(force, force_trials, length, length_trials)
@@ -239,24 +243,30 @@ def _second_inputs(model, length, rows):
     return parts
 
 
-def _length_stage(model, length, rows, levels, recipe):
+def _fitted_rows(length, trials, some):
+    """Return the rows of the length table that are fitted, ndarray of bool."""
+    rows = choose_trials(length, trials, 'length')
+    return rows if some is None else rows & some
+
+
+def _length_stage(model, length, rows, levels, recipe, some):
     """Fit H2 to length against F - H1[V]."""
     model.length_stage, fit = recipe.fit(
         _second_inputs(model, length, rows), length.column(model.response)[rows],
         length.column('trial')[rows], levels, (0.0, 0.0),
         # The range of a drive is given; that of F - H1[V] is whatever the loads made it.
-        placed=model.force_stage is not None)
+        placed=model.force_stage is not None, fitted=None if some is None else some[rows])
     return fit
 
 
-def _drive_stage(model, length, rows, levels, recipe):
+def _drive_stage(model, length, rows, levels, recipe, some):
     """Fit one operator of the drive, of the sign that fits better."""
     results = []
     for sign in (-1, 1):
         model.sign = sign
-        fit = _length_stage(model, length, rows, levels, recipe)
-        predicted = model.predict(length)
-        rmse = float(np.sqrt(np.mean((predicted - length.column(model.response))[rows] ** 2)))
+        fit = _length_stage(model, length, rows, levels, recipe, some)
+        residual = model.predict(length) - length.column(model.response)
+        rmse = float(np.sqrt(np.mean(residual[rows if some is None else rows & some] ** 2)))
         results.append((rmse, sign, model.length_stage, fit))
     _, model.sign, model.length_stage, fit = min(results, key=lambda result: result[0])
     return fit

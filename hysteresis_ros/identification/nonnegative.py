@@ -59,7 +59,8 @@ def solve_nonnegative(
             ~passive & (gradient < -gradient_tolerance))
         count = int(np.count_nonzero(wrong))
         if count == 0:
-            return np.where(passive, x, 0.0), passive
+            # The tolerance on signs is one of rounding: nothing below the bound is handed on.
+            return np.where(free, x, np.where(passive, np.maximum(x, 0.0), 0.0)), passive
         if count < fewest:
             fewest, tries = count, 3
         elif tries > 0:

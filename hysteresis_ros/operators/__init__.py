@@ -6,8 +6,8 @@ from .additive import Additive
 from .areas import signed_areas, signed_lengths
 from .base import HysteresisOperator, Inversion, operator_from_dict
 from .bouc_wen import BoucWen
-from .cascade import Cascade, linear_drive_model, linear_model
-from .coupled import Coupled, coupled_from_dict
+from .cascade import Cascade
+from .dead_zones import DeadZones
 from .everett import cell_areas, cells
 from .linear import Linear
 from .play import PrandtlIshlinskii
@@ -17,7 +17,7 @@ __all__ = [
     'Additive',
     'BoucWen',
     'Cascade',
-    'Coupled',
+    'DeadZones',
     'HysteresisOperator',
     'Inversion',
     'Linear',
@@ -25,9 +25,6 @@ __all__ = [
     'Preisach',
     'cell_areas',
     'cells',
-    'coupled_from_dict',
-    'linear_drive_model',
-    'linear_model',
     'operator_from_dict',
     'signed_areas',
     'signed_lengths',
