@@ -232,8 +232,8 @@ def noise_benchmarks(quick: bool) -> dict:
         Jitter of the voltage (of its range) per jitter of the reference (of its range): for
         single references at distances from a reversal, and for a constant reference with noise
         whose voltages are committed one after the other, as a compensator does; with the exact
-        inverse, and with a dead band as wide as the noise from peak to peak. For the committed run also the root mean square error of
-        the length against the reference without noise.
+        inverse, and with a dead band as wide as the noise from peak to peak. For the committed
+        run also the root mean square error of the length against the reference without noise.
     """
     options = {'exact': (), 'dead_band': (0.0, 8.0 * NOISE * LENGTH)}
     results = {}

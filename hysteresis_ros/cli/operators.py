@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis operators`: which operator describes a muscle best, and what it costs."""
 
-from pathlib import Path
-
-from hysteresis_ros.cli.common import add_json, must_differ, progress, say, Steps, write_json
+from hysteresis_ros.cli.common import add_json, progress, say, Steps, write_json
+from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
 
 def add_parser(subparsers):
@@ -15,11 +14,11 @@ def add_parser(subparsers):
         'Bouc-Wen operators, alone and in two stages, and the additive and embedded models that '
         'the paper rejects, with one trial held out in turn (of one trial alone, blocks of rows). '
         'Prints errors, number of parameters and time of a step, and says which to take.')
-    parser.add_argument('--length', required=True, metavar='L.csv',
+    parser.add_argument('--length', type=InputPath, required=True, metavar='L.csv',
                         help='length or strain, under loads or not')
-    parser.add_argument('--force', metavar='F.csv', help='force at resting length')
+    parser.add_argument('--force', type=InputPath, metavar='F.csv', help='force at resting length')
     add_json(parser)
-    parser.add_argument('--plot', metavar='P.png',
+    parser.add_argument('--plot', type=OutputFile, metavar='P.png',
                         help='draw the error over parameters and over the time of a step')
     return parser
 
@@ -29,9 +28,6 @@ def run(args):
     from hysteresis_ros.cli.identify import table
     from hysteresis_ros.identification.choice import compare_operators
 
-    for path in (args.plot, args.json):
-        if path not in (None, '-'):
-            must_differ(path, args.length, args.force)
     steps = Steps()
     steps('reading')
     force = table(args.force, ('force',))
@@ -43,9 +39,10 @@ def run(args):
     if args.json:
         write_json(args.json, {**choice.to_json(), 'advice': advice(choice)})
     if args.plot:
-        from hysteresis_ros.diagnosis.choice_plot import choice_figure
-        from hysteresis_ros.diagnosis.drawing import png
-        Path(args.plot).write_bytes(png(choice_figure(choice)))
+        from hysteresis_ros.atomic import write_bytes
+        from hysteresis_ros.report.choice_plot import choice_figure
+        from hysteresis_ros.report.drawing import png
+        write_bytes(args.plot, png(choice_figure(choice)))
 
 
 def report(choice):
@@ -61,7 +58,7 @@ def report(choice):
     str
 
     """
-    from hysteresis_ros.diagnosis.compare import layout
+    from hysteresis_ros.comparison.compare import layout
 
     rows = [['operator', 'held out', 'fitted', 'parameters', 'simulate', 'invert']]
     for score in choice.scores:

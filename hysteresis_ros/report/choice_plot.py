@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The picture of operators side by side: their error over what they cost."""
 
-from hysteresis_ros.diagnosis.drawing import new_figure
+from hysteresis_ros.report.drawing import new_figure
 
 
 def choice_figure(choice):
