@@ -26,6 +26,8 @@ LEAST_GAIN = 0.02
 LONGEST = 1.0
 # The base model's own error bends an estimate by up to about this share.
 ESTIMATE_SLACK = 0.15
+# Standard deviations to each side of a 95 % interval.
+FACTOR = 1.96
 
 
 @dataclasses.dataclass
@@ -245,7 +247,23 @@ class Fitter:
         better = self.fit([fit.effects], point, steps=3) if len(fit.vector) else [fit]
         return max([self.judge(one) for one in (fit, *better)], key=lambda one: one.log_evidence)
 
-    def with_intervals(self, fit: Fit, factor: float = 1.96) -> list:
+    def least_squares(self, fit: Fit) -> Fit:
+        """
+        Return a fit whose effects predict best: by least squares, whatever the covariance.
+
+        Where an effect's equation is not quite that of nature, the values that predict best are
+        not the most probable ones; what they differ by counts in the intervals.
+        """
+        if not len(fit.vector):
+            return fit
+        white = self.covariance.white(max(self.error(fit.predicted), self.covariance.resolution))
+        found, = self.fit([fit.effects], white) or [fit]
+        away = found.vector - fit.vector
+        return dataclasses.replace(
+            found, log_evidence=fit.log_evidence, point=fit.point,
+            spread=fit.spread + np.outer(away, away) / FACTOR ** 2)
+
+    def with_intervals(self, fit: Fit, factor: float = FACTOR) -> list:
         """Return the fitted effects with 95 % intervals of their parameters."""
         half = factor * np.sqrt(np.maximum(np.diag(fit.spread), 0.0))
         return ParameterVector(fit.effects, self.problem.kind).with_intervals(fit.vector, half)

@@ -132,6 +132,12 @@ class Covariance:
                     - 0.5 * len(total) * np.log(2.0 * np.pi))
         return Point(np.array(values), factor, constant)
 
+    def white(self, size: float) -> Point:
+        """Return the covariance of white noise alone, in which a fit is one by least squares."""
+        count = len(self._discrepancy)
+        values = np.array([self._low[0], self._low[1], self._middle, np.log(size)])
+        return Point(values, size * np.eye(count), -np.inf)
+
     def add(self, values: np.ndarray) -> Point:
         """Return the covariance for values (4,) and keep it among the `points`."""
         found = self.point(values)

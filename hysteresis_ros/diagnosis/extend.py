@@ -161,7 +161,8 @@ def _on_arm(problem, model, classes) -> list:
     fit, found = selection.base, []
     for kind in classes:
         fit = selection.add(fit, present(model, kind))
-        found.append((selection.fitter.with_intervals(fit), fit.implausible()))
+        best = selection.fitter.least_squares(fit)
+        found.append((selection.fitter.with_intervals(best), best.implausible()))
     return found
 
 

@@ -80,12 +80,13 @@ class Selection:
         self.alone = self._beside(self.base)
         self._fit([effects for _, effects in self.alone.singles().values()])
         self.p_values = self._significance()
-        self._fit_best(self.alone.pairs())
         self._grown.add(frozenset())
         for size in range(1, self.settings.most_effects + 1):
             self._refine(size)
             if size == self.settings.most_effects or not self._worth_growing():
                 break
+            if size == 1:
+                self._fit_best(self.alone.pairs())
             for names in self.progress(self._ranked_of(size), self.settings.beam):
                 self.grow(names)
         self._refine_best()
