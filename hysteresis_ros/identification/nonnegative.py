@@ -5,7 +5,7 @@
 from typing import Optional
 
 import numpy as np
-from scipy import linalg
+from scipy.linalg import lapack
 
 from hysteresis_ros.errors import IdentificationError
 
@@ -74,13 +74,13 @@ def solve_nonnegative(
         'least squares: no solution found; use a larger strength or fewer levels')
 
 
-def _solve(gram, moment):
-    try:
-        factor = linalg.cho_factor(gram, check_finite=False)
-    except linalg.LinAlgError:
+def _solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    # LAPACK itself: for a problem this small the checks of scipy.linalg cost as much as its work.
+    _, x, failed = lapack.dposv(gram, moment)
+    if failed:
         raise IdentificationError(
-            'least squares: the problem is singular; use a strength above 0') from None
-    return linalg.cho_solve(factor, moment, check_finite=False)
+            'least squares: the problem is singular; use a strength above 0')
+    return x
 
 
 def quick_weights(rows: np.ndarray, target: np.ndarray, scale: np.ndarray, penalty: np.ndarray,
