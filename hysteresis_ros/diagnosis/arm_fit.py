@@ -263,6 +263,15 @@ class Fitter:
             found, log_evidence=fit.log_evidence, point=fit.point,
             spread=fit.spread + np.outer(away, away) / FACTOR ** 2)
 
+    def least_error(self, fit: Fit) -> float:
+        """Return the root mean square error after one step towards the least squares."""
+        if not len(fit.vector):
+            return self.error(fit.predicted)
+        walk = _Walk(fit.effects, self.problem.kind)
+        walk.vector = fit.vector
+        step = self._step(fit, walk, np.ones(len(fit.predicted), dtype=bool))
+        return min(self.error(fit.predicted), self.error(fit.predicted + fit.jacobian @ step))
+
     def with_intervals(self, fit: Fit, factor: float = FACTOR) -> list:
         """Return the fitted effects with 95 % intervals of their parameters."""
         half = factor * np.sqrt(np.maximum(np.diag(fit.spread), 0.0))

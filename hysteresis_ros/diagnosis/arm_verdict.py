@@ -3,9 +3,9 @@
 """
 The verdict on runs of an arm, from the posterior probabilities of the sets of effects.
 
-A set that leaves more than the base model's own error could be does not explain the recording,
-whatever its evidence: its probability is that of an unknown cause. So is the probability of
-something that happened once.
+A set that leaves more than the base model's own error could be does not explain the recording:
+something unknown acts as well, whose probability beforehand is that of any effect, and the set's
+probability is that of an unknown cause. So is the probability of something that happened once.
 """
 
 import math
@@ -100,7 +100,10 @@ class _Verdict:
     def _probabilities(self, valid, event_log) -> dict:
         """Return the posterior probability of each set, and of 'unknown'."""
         temper = self.settings.temper
-        weights = {names: self.selection.log_posterior(names) / temper for names in valid}
+        # What does not suffice needs one cause more, as improbable as any other effect.
+        further = math.log(self.settings.prior / (1.0 - self.settings.prior))
+        weights = {names: (self.selection.log_posterior(names) + (
+            0.0 if self.selection.sufficient(names) else further)) / temper for names in valid}
         top = max([event_log, *weights.values()])
         mass = {names: math.exp(value - top) for names, value in weights.items()}
         unknown = math.exp(event_log - top)

@@ -21,8 +21,9 @@ from scipy import linalg, optimize
 WIDEST = 1e3
 # Spread (natural logarithm) of the correlation time about the middle of those that can be seen.
 TIME_SPREAD = 1.5
-# Largest scale of the discrepancy (natural logarithm).
-LARGEST_SCALE = 1.5
+# Largest scale of the discrepancy (natural logarithm): two standard deviations of its prior. What
+# goes beyond is no error that the bench has seen.
+LARGEST_SCALE = 0.6
 EVALUATIONS = 25
 _TINY = 1e-300
 

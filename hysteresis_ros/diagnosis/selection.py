@@ -71,6 +71,7 @@ class Selection:
         self.fits: dict[frozenset, Fit] = {frozenset(): self.base}
         self._grown: set[frozenset] = set()
         self._refined: set[frozenset] = set()
+        self._least_errors: dict[frozenset, float] = {}
         self.limit = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised | None = None
         self.p_values: dict[str, float] = {}
@@ -174,6 +175,8 @@ class Selection:
             if names not in self._refined:
                 self._refined.add(names)
                 self.fits[names] = self.fitter.refined(self.fits[names])
+                least = self.fitter.least_squares(self.fits[names])
+                self._least_errors[names] = self.fitter.error(least.predicted)
         self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
         self.base = self.fits[frozenset()]
 
@@ -203,8 +206,10 @@ class Selection:
         return sorted(self.fits, key=lambda names: -self.log_posterior(names))
 
     def error(self, names) -> float:
-        """Return the RMSE of a set on all judged rows."""
-        return self.fitter.error(self.fits[names].predicted)
+        """Return the RMSE of a set on all judged rows, fitted by least squares."""
+        if names not in self._least_errors:
+            return self.fitter.least_error(self.fits[names])
+        return min(self._least_errors[names], self.fitter.error(self.fits[names].predicted))
 
     def structure(self, names) -> float:
         """Return the root mean square of a set's residual without white noise."""
@@ -222,7 +227,8 @@ class Selection:
         Return the sets that may be the answer, most probable first.
 
         All values are physical, and each effect matters: without it the error is larger by a
-        practical size, and if others stay, then by more than the base model's own error explains.
+        practical size and by more than the expected error of the base model, and if others stay,
+        it is larger than the base model's own error could be.
         A single effect also has to explain more than the best of all would by chance.
         """
         return [names for names in self.ranked()
@@ -237,7 +243,8 @@ class Selection:
             before = self.error(without)
             least = max(self.settings.practical * before,
                         LEAST_SHARE * self.error(frozenset()))
-            if before - error < least or (without and self.sufficient(without)):
+            if (before - error < least or before ** 2 - error ** 2 < self.covariance.size ** 2
+                    or (without and self.sufficient(without))):
                 return False
         return True
 

@@ -53,6 +53,6 @@ class Settings:
     correlation: float = 0.45
     practical: float = 0.05
     residual_share: float = 0.08
-    temper: float = 3.0
+    temper: float = 2.0
     reported: float = 0.02
     draws: int = 400
