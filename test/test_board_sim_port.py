@@ -38,6 +38,7 @@ def frames(data):
 def test_url_without_keys_is_a_perfect_arm_at_real_time():
     assert parse_url('sim://bicep', EFFECTS) == Simulation()
     assert parse_url('SIM://Bicep/', EFFECTS) == Simulation()
+    assert parse_url('sim://bicep?muscle=brinson', EFFECTS) == Simulation(muscle='brinson')
 
 
 def test_every_key():
@@ -66,6 +67,13 @@ def test_urls_that_make_no_sense_say_so_in_one_line(url, words):
 def test_strengths_that_no_effect_has_are_refused_before_opening():
     with pytest.raises(ParameterError, match='supply_sag'):
         protocol_sim.check_url('sim://bicep?supply_sag=50')
+
+
+def test_the_muscle_of_the_url_is_the_arms():
+    plant = protocol_sim.make_plant(parse_url('sim://bicep?muscle=lagoudas', EFFECTS))
+    assert plant.material.name == 'lagoudas'
+    with pytest.raises(ParameterError, match='there are grains, brinson, lagoudas'):
+        protocol_sim.check_url('sim://bicep?muscle=tanaka')
 
 
 def test_effects_reach_the_arm():

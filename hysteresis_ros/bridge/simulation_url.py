@@ -8,6 +8,7 @@ key             meaning
 =============== ===================================================================================
 speed           how much faster than the wall's clock the arm lives (0.01 to 1000; 1)
 seed            which specimen of arm and wire, and all that is left to chance (0)
+muscle          constitutive model of the wires: grains, brinson or lagoudas (grains)
 recording       which recording on that specimen: another one has other noise (0)
 recording_time  how long it takes, about, in s, for effects that are slow or rare (900)
 time_constant   of the wires' heating and cooling in s (0.05 to 100; 5 as in the paper)
@@ -66,6 +67,7 @@ class Simulation:
     deaf_after: float = math.inf
     deaf_for: float = math.inf
     effects: dict = dataclasses.field(default_factory=dict)
+    muscle: str = 'grains'
 
 
 def parse_url(url, known_effects):
@@ -96,14 +98,16 @@ def parse_url(url, known_effects):
     for key, text in parse_qsl(parts.query, keep_blank_values=True):
         if key in values or key in effects:
             raise ParameterError(f'port {url}: {key} is given twice')
-        if key in _RANGES:
+        if key == 'muscle':
+            values[key] = text
+        elif key in _RANGES:
             values[key] = _number(url, key, text, _RANGES[key])
         elif key in known_effects:
             effects[key] = _number(url, key, text, _STRENGTHS)
         else:
             raise ParameterError(
-                f'port {url}: there is no {key!r}; keys are {", ".join(_RANGES)}, and the '
-                'effects that `hysteresis effects` lists')
+                f'port {url}: there is no {key!r}; keys are {", ".join(_RANGES)}, muscle, '
+                'and the effects that `hysteresis effects` lists')
     return Simulation(**values, effects=effects)
 
 

@@ -13,10 +13,12 @@ of Intelligent Material Systems and Structures 4 (1993) 229-242. With the shares
 Martensite is oriented between the critical stresses, sigma_s + C_M (T - M_s) and sigma_f + the
 same, which are constant below M_s; between M_s and M_f the cold makes self-accommodated martensite;
 both turn to austenite between A_s + sigma / C_A and A_f + sigma / C_A. Each share goes along half a
-cosine from where its last turn in the other direction has left it. Where stress and cold act
-together the paper's rule lets the shares add up to more than one; here is the one of H. Chung, J.
-Heo, J. Lee: Implementation strategy for the dual transformation region in the Brinson SMA
-constitutive model, Smart Materials and Structures 16 (2007) N1.
+cosine from where its last turn in the other direction has left it; so a low stress orients a little
+more with each partial cycle. Where stress and cold act together the paper's rule lets the shares
+add up to more than one; here is the one of H. Chung, J. Heo, J. Lee: Implementation strategy for
+the dual transformation region in the Brinson SMA constitutive model, Smart Materials and Structures
+16 (2007) N1. Beyond the stress at which the lines of both directions cross (544 MPa with the
+paper's constants) martensite begins to form on the line of A_s.
 
 The constants are the paper's, after measurements of Dye (1990) on NiTi. That wire has no stroke
 under less than 100 MPa. The specimens of the laboratory are trained: an internal stress that
@@ -64,7 +66,7 @@ class BrinsonMaterial(Material):
 
     name: ClassVar[str] = 'brinson'
     temperature_step: ClassVar[float] = 4.0
-    arm_range: ClassVar[tuple[float, float]] = (141.6, 94.2)
+    arm_range: ClassVar[tuple[float, float]] = (141.8, 93.4)
     resting_length: float = 0.27
     diameter: float = 0.203e-3
     pretension: float = 0.5
@@ -104,8 +106,8 @@ class BrinsonMaterial(Material):
                 usual.austenite_finish - usual.austenite_start),
             austenite_modulus=vary(rng, usual.austenite_modulus, 0.04),
             martensite_modulus=vary(rng, usual.martensite_modulus, 0.04),
-            largest_strain=vary(rng, usual.largest_strain, 0.03),
-            training_stress=vary(rng, usual.training_stress, 0.04),
+            largest_strain=vary(rng, usual.largest_strain, 0.02),
+            training_stress=vary(rng, usual.training_stress, 0.015),
             austenite_slope=vary(rng, usual.austenite_slope, 0.03),
             martensite_slope=vary(rng, usual.martensite_slope, 0.03))
 
@@ -188,50 +190,25 @@ class BrinsonWire(Wire):
         """Return the shares at a temperature [degC] and an applied stress [Pa]."""
         material = self.material
         stress = stress + material.training_stress
-        pulled, cooled = self._onward(temperature, stress)
-        if not shares.forming:
-            if pulled > 0.0 or cooled > 0.0:
-                start = Shares(shares.oriented, shares.accommodated, shares.oriented,
-                               shares.accommodated)
-                return self._form(start, pulled, cooled)
-        elif pulled > shares.pulled or cooled > shares.cooled:
-            return self._form(shares, max(pulled, shares.pulled), max(cooled, shares.cooled))
-        return self._go_back(shares, temperature, stress)
-
-    def _onward(self, temperature: float, stress: float) -> tuple[float, float]:
-        """Return how far along stress and cold are towards martensite, each from 0 to 1."""
-        material = self.material
-        beyond = stress - material.martensite_slope * max(
-            temperature - material.martensite_start, 0.0)
+        above_start = temperature - material.austenite_start - stress / material.austenite_slope
+        beyond = min(stress - material.martensite_slope * max(
+            temperature - material.martensite_start, 0.0),
+            material.orienting_start - material.martensite_slope * above_start)
         pulled = _half_cosine((beyond - material.orienting_start)
                               / (material.orienting_finish - material.orienting_start))
         cooled = _half_cosine((material.martensite_start - temperature)
                               / (material.martensite_start - material.martensite_finish))
-        return pulled, cooled
-
-    @staticmethod
-    def _form(shares: Shares, pulled: float, cooled: float) -> Shares:
-        free = 1.0 - shares.from_oriented
-        oriented = shares.from_oriented + free * pulled
-        accommodated = (shares.from_accommodated
-                        + (free - shares.from_accommodated) * cooled) * (1.0 - pulled)
-        return Shares(oriented, accommodated, shares.from_oriented, shares.from_accommodated,
-                      True, pulled, cooled)
-
-    def _go_back(self, shares: Shares, temperature: float, stress: float) -> Shares:
-        material = self.material
-        left = 1.0 - _half_cosine(
-            (temperature - material.austenite_start - stress / material.austenite_slope)
-            / (material.austenite_finish - material.austenite_start))
-        if left >= 1.0:
+        if above_start > 0.0:
+            return _gone_back(shares, 1.0 - _half_cosine(
+                above_start / (material.austenite_finish - material.austenite_start)))
+        if not shares.forming:
+            if pulled == 0.0 and cooled == 0.0:
+                return shares
+            shares = Shares(shares.oriented, shares.accommodated, shares.oriented,
+                            shares.accommodated)
+        elif pulled <= shares.pulled and cooled <= shares.cooled:
             return shares
-        if shares.forming:
-            oriented, accommodated = shares.oriented, shares.accommodated
-        else:
-            oriented, accommodated = shares.from_oriented, shares.from_accommodated
-        if left * (oriented + accommodated) >= shares.martensite:
-            return shares
-        return Shares(left * oriented, left * accommodated, oriented, accommodated, False)
+        return _formed(shares, max(pulled, shares.pulled), max(cooled, shares.cooled))
 
     def _strain(self, shares: Shares, temperature: float, stress: float) -> float:
         material, oriented, martensite = self.material, shares.oriented, shares.martensite
@@ -249,6 +226,26 @@ class BrinsonWire(Wire):
     def _commit_strain(self, temperature: float, stress: float) -> float:
         self._shares = self._turn(self._shares, temperature, stress)
         return self._strain(self._shares, temperature, stress)
+
+
+def _formed(shares: Shares, pulled: float, cooled: float) -> Shares:
+    """Return the shares after stress and cold have gone on along their cosines."""
+    from_oriented, from_accommodated = shares.from_oriented, shares.from_accommodated
+    free = 1.0 - from_oriented
+    return Shares(from_oriented + free * pulled,
+                  (from_accommodated + (free - from_accommodated) * cooled) * (1.0 - pulled),
+                  from_oriented, from_accommodated, True, pulled, cooled)
+
+
+def _gone_back(shares: Shares, left: float) -> Shares:
+    """Return the shares of which at most a part `left` of those at the last turn is left."""
+    if shares.forming:
+        oriented, accommodated = shares.oriented, shares.accommodated
+    else:
+        oriented, accommodated = shares.from_oriented, shares.from_accommodated
+    if left * (oriented + accommodated) >= shares.martensite:
+        return shares
+    return Shares(left * oriented, left * accommodated, oriented, accommodated, False)
 
 
 def _half_cosine(part: float) -> float:

@@ -75,7 +75,7 @@ class LagoudasMaterial(Material):
 
     name: ClassVar[str] = 'lagoudas'
     temperature_step: ClassVar[float] = 4.0
-    arm_range: ClassVar[tuple[float, float]] = (137.0, 91.5)
+    arm_range: ClassVar[tuple[float, float]] = (135.2, 89.7)
     resting_length: float = 0.27
     diameter: float = 0.203e-3
     pretension: float = 0.5
@@ -99,11 +99,11 @@ class LagoudasMaterial(Material):
         """
         Return a batch that differs a little from the next.
 
-        Its transformation temperatures are lower and closer than those of the source, so that 6 V
-        and no voltage drive it from end to end under each load of the bench.
+        Its transformation temperatures are lower than those of the source and half as far apart,
+        so that 6 V and no voltage drive it from end to end under each load of the bench.
         """
-        usual = cls(martensite_start=44.0, martensite_finish=22.0,
-                    austenite_start=44.0, austenite_finish=66.0)
+        usual = cls(martensite_start=54.0, martensite_finish=22.0,
+                    austenite_start=42.0, austenite_finish=74.0)
         shift = rng.uniform(0.0, 1.5)
         width = vary(rng, 1.0, 0.06)
         loop = vary(rng, 1.0, 0.05)

@@ -62,11 +62,11 @@ def make_plant(simulation):
     Raises
     ------
     ParameterError
-        If an effect cannot have this strength.
+        If an effect cannot have this strength, or there is no such muscle.
 
     """
     return Plant(simulation.seed, simulation.effects, simulation.time_constant,
-                 simulation.recording, simulation.recording_time)
+                 simulation.recording, simulation.recording_time, simulation.muscle)
 
 
 class Serial(SerialBase):
