@@ -74,7 +74,7 @@ class LagoudasMaterial(Material):
     """
 
     name: ClassVar[str] = 'lagoudas'
-    temperature_step: ClassVar[float] = 4.0
+    temperature_step: ClassVar[float] = 1.0
     arm_range: ClassVar[tuple[float, float]] = (135.2, 89.7)
     resting_length: float = 0.27
     diameter: float = 0.203e-3
