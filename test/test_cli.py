@@ -194,6 +194,21 @@ def test_simulate_writes_the_tables_of_a_protocol(tmp_path, capsys):
         ['simulate', 'bench', '-o', f'{tmp_path}/x', '--effect', 'nothing=0.4'], capsys)
 
 
+def test_simulate_takes_another_constitutive_model(tmp_path, capsys):
+    for muscle in ('grains', 'lagoudas'):
+        assert main(['simulate', 'bench', '-o', f'{tmp_path}/{muscle}', '--muscle', muscle]) == 0
+    capsys.readouterr()
+    usual, other = (Path(f'{tmp_path}/{muscle}/length.csv').read_text()
+                    for muscle in ('grains', 'lagoudas'))
+    assert usual != other and usual.splitlines()[0] == other.splitlines()[0]
+    assert 'there are grains, brinson, lagoudas' in failed(
+        ['simulate', 'bench', '-o', f'{tmp_path}/x', '--muscle', 'tanaka'], capsys)
+    assert 'a brinson muscle cannot have r_phase' in failed(
+        ['simulate', 'bench', '-o', f'{tmp_path}/x', '--muscle', 'brinson', '--effect', 'r_phase'],
+        capsys)
+    assert not Path(f'{tmp_path}/x').exists()
+
+
 def test_effects_lists_and_explains(capsys, tmp_path):
     assert main(['effects', '--json', f'{tmp_path}/e.json']) == 0
     text = capsys.readouterr().out

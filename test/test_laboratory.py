@@ -11,6 +11,7 @@ from hysteresis_ros.laboratory import GEOMETRY, Plant
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Air, Conditions
 from hysteresis_ros.laboratory.experiments import LOADS
+from hysteresis_ros.laboratory.grain_wire import GrainMaterial, GrainWire
 from hysteresis_ros.laboratory.grains import GrainDistribution, Grains
 from hysteresis_ros.laboratory.heat import GAIN, HeatBalance, ROOM
 from hysteresis_ros.laboratory.linkage import Linkage
@@ -19,7 +20,6 @@ from hysteresis_ros.laboratory.sensors import (
     COUNT, counted_angle, encoder_counts, LENGTH_RESOLUTION, load_cell, position_sensor)
 from hysteresis_ros.laboratory.sequences import damped_oscillation
 from hysteresis_ros.laboratory.solve import RootFinder
-from hysteresis_ros.laboratory.wire import Wire, WireMaterial
 import numpy as np
 import pytest
 
@@ -45,7 +45,7 @@ def half_way(wire, tension, heating):
     raise AssertionError('the wire does not turn')
 
 
-class SlowWire(Wire):
+class SlowWire(GrainWire):
     """A wire whose martensite share is returned at each step."""
 
     def commit_share(self, temperature, tension):
@@ -57,7 +57,7 @@ class SlowWire(Wire):
 @pytest.mark.parametrize('heating', [True, False])
 def test_clausius_clapeyron_slope(heating):
     """Seven megapascals shift the heating by one kelvin, and a little more the cooling."""
-    wire = SlowWire(WireMaterial())
+    wire = SlowWire(GrainMaterial())
     stresses = np.array([20e6, 120e6, 220e6])
     found = [half_way(wire, stress * wire.material.section, heating) for stress in stresses]
     slope = np.polyfit(found, stresses, 1)[0]
@@ -67,7 +67,7 @@ def test_clausius_clapeyron_slope(heating):
 
 def test_heating_lags_cooling():
     """Each wire turns to austenite at a higher temperature than back."""
-    wire = SlowWire(WireMaterial())
+    wire = SlowWire(GrainMaterial())
     assert half_way(wire, 3.0, True) - half_way(wire, 3.0, False) == pytest.approx(8.0, abs=3.0)
 
 
@@ -116,8 +116,8 @@ def test_return_point_memory():
 
 def test_elastic_moduli():
     """Cold martensite under saturating stress and hot austenite stretch by Hooke's law."""
-    material = WireMaterial(strain_without_load=0.03, largest_strain=0.03)
-    wire = Wire(material)
+    material = GrainMaterial(strain_without_load=0.03, largest_strain=0.03)
+    wire = GrainWire(material)
     for temperature, modulus in ((22.0, 32e9), (300.0, 62e9)):
         low = wire.commit(temperature, 3.0)
         high = wire.commit(temperature, 4.0)
@@ -127,7 +127,7 @@ def test_elastic_moduli():
 
 def test_transformation_strain_grows_with_stress_and_saturates():
     """A third of the way at 0.4 orienting stresses, nearly all at five."""
-    material = WireMaterial()
+    material = GrainMaterial()
     low, high = material.strain_without_load, material.largest_strain
     share = [(material.transformation_strain(s * material.orienting_stress) - low) / (high - low)
              for s in (0.0, 0.405465, 5.0)]
@@ -136,7 +136,7 @@ def test_transformation_strain_grows_with_stress_and_saturates():
 
 def test_cold_wire_under_pretension_has_its_resting_length():
     """Elongation counts from there; a heated wire is shorter, a loaded one longer."""
-    wire = Wire(WireMaterial())
+    wire = GrainWire(GrainMaterial())
     assert wire.elongation(ROOM, 0.5) == pytest.approx(0.0, abs=2e-5)
     assert wire.elongation(120.0, 0.5) < -6e-3
     assert wire.elongation(ROOM, 5.0) > 4e-3
@@ -146,7 +146,7 @@ def test_cold_wire_under_pretension_has_its_resting_length():
 @given(st.floats(22.0, 110.0), st.floats(0.1, 14.0), st.floats(22.0, 110.0))
 def test_tension_is_the_inverse_of_elongation(past, tension, temperature):
     """The tension found at an elongation gives that elongation again."""
-    wire = Wire(WireMaterial())
+    wire = GrainWire(GrainMaterial())
     wire.commit(past, 3.0)
     elongation = wire.elongation(temperature, tension)
     found = wire.tension(temperature, elongation)
@@ -155,7 +155,7 @@ def test_tension_is_the_inverse_of_elongation(past, tension, temperature):
 
 def test_a_slack_wire_does_not_push():
     """Shorter than the unloaded wire there is no tension."""
-    assert Wire(WireMaterial()).tension(ROOM, -0.01) == 0.0
+    assert GrainWire(GrainMaterial()).tension(ROOM, -0.01) == 0.0
 
 
 @pytest.mark.parametrize('guess', [-3.0, 0.0, 2.9, 8.0])
@@ -258,7 +258,7 @@ def test_a_heavier_load_is_longer_when_cold():
 
 def test_heat_and_cool_cycle_wipes_the_memory():
     """A trial does not depend on the trials before; without the cycle it would."""
-    wire = Wire(WireMaterial())
+    wire = GrainWire(GrainMaterial())
     fresh = [wire.elongation(t, 3.0) for t in (40.0, 50.0, 60.0)]
     for temperature, tension in ((70.0, 8.0), (45.0, 1.0), (55.0, 5.0)):
         wire.commit(temperature, tension)

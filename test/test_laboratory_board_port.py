@@ -49,6 +49,7 @@ def frames(data):
 def test_url_without_keys_is_a_perfect_arm_at_real_time():
     assert parse_url('sim://bicep') == Simulation()
     assert parse_url('SIM://Bicep/') == Simulation()
+    assert parse_url('sim://bicep?muscle=brinson') == Simulation(muscle='brinson')
 
 
 def test_url_with_every_key_is_read():
@@ -77,6 +78,13 @@ def test_urls_that_make_no_sense_say_so_in_one_line(url, words):
 def test_strengths_that_no_effect_has_are_refused_before_opening():
     with pytest.raises(ParameterError, match='supply_sag'):
         check_url('sim://bicep?supply_sag=50')
+
+
+def test_the_muscle_of_the_url_is_the_arms():
+    plant = make_plant(parse_url('sim://bicep?muscle=lagoudas'))
+    assert plant.material.name == 'lagoudas'
+    with pytest.raises(ParameterError, match='there are grains, brinson, lagoudas'):
+        check_url('sim://bicep?muscle=tanaka')
 
 
 def test_effects_reach_the_arm():

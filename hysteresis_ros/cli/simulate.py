@@ -23,6 +23,9 @@ def add_parser(subparsers):
     parser.add_argument('--effect', action='append', default=[], type=effect,
                         metavar='NAME[=STRENGTH]',
                         help='hide an effect; strength 1 is strong (default), 0.4 weak')
+    parser.add_argument('--muscle', default='grains', metavar='MODEL',
+                        help='constitutive model of the wires: grains (default), brinson or '
+                        'lagoudas')
     parser.add_argument('--seed', type=seed, default=0,
                         help='of specimen, noise and random sequences')
     return parser
@@ -51,5 +54,6 @@ def run(args):
     """Do it."""
     from hysteresis_ros.laboratory.experiments import write_experiment
 
-    for path in write_experiment(args.protocol, args.output, dict(args.effect), args.seed):
+    for path in write_experiment(args.protocol, args.output, dict(args.effect), args.seed,
+                                 args.muscle):
         print(path)

@@ -18,6 +18,7 @@ from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.linkage import GEOMETRY, HIGHEST_ANGLE, LOWEST_ANGLE
 from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.solve import RootFinder
+from hysteresis_ros.laboratory.wire import steps_between
 
 __all__ = ['Arm', 'GEOMETRY']
 
@@ -30,6 +31,8 @@ SETTLING_DT = 1.0
 INERTIAL_DT = 0.02
 # Damping of the wires' own, over the critical one, where nothing else damps the arm.
 INNER_DAMPING = 0.03
+# At which every wire is austenite, whatever its load [degC].
+HOT = 160.0
 # About how stiff the arm is [N m/rad], and how far the wires go with its angle [m/rad].
 TYPICAL_STIFFNESS, TYPICAL_LEVER = 4.0, 0.025
 
@@ -80,6 +83,8 @@ class Arm:
         self.muscle.heat_and_cool(self.temperature)
         self._velocity = 0.0
         self._settle_down()
+        if math.isfinite(self.conditions.material.temperature_step):
+            self._cool_under_load()
         self._played = self.angle
         self._history = collections.deque([(self.time, self._seen())])
 
@@ -148,13 +153,16 @@ class Arm:
         kept = math.exp(-dt / air.turbulence_time)
         self._fluctuation = kept * self._fluctuation + (
             air.turbulence * math.sqrt(1.0 - kept * kept) * self._rng.standard_normal())
+        before = self.temperature
         self._heat(dt, voltage)
         extra = sum(one.excess(self.time, self.tensions[0]) for one in conditions.disturbances)
         self.muscle.age(voltage, dt, extra)
-        if moving:
-            self._swing(dt)
-        else:
-            self._find_balance(dt)
+        path = steps_between(before, self.temperature, conditions.material.temperature_step)
+        for self.temperature in path:
+            if moving:
+                self._swing(dt / len(path))
+            else:
+                self._find_balance(dt / len(path))
         self._sense()
 
     def _heat(self, dt: float, voltage: float) -> None:
@@ -234,6 +242,15 @@ class Arm:
     def _settle_down(self) -> None:
         """Let the arm sink from above to where it rests, against friction if there is any."""
         self._rest_where(lambda theta: self._needed(theta) - self.conditions.coulomb, self.angle)
+
+    def _cool_under_load(self) -> None:
+        """Heat fully and cool again with the arm's own load on the wires, which remember it."""
+        def balance(temperature):
+            self.temperature = temperature
+            self._settle_down()
+        room = self.temperature
+        self.muscle.cool_down(
+            steps_between(HOT, room, self.conditions.material.temperature_step), balance)
 
     def _swing(self, dt: float) -> None:
         """Move the arm with its inertia, by one semi-implicit step."""

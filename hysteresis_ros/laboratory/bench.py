@@ -16,7 +16,7 @@ from hysteresis_ros.laboratory.heat import ROOM
 from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.solve import RootFinder
 from hysteresis_ros.laboratory.wire import (
-    LARGEST_TENSION, LENGTH_TOLERANCE, TYPICAL_COMPLIANCE)
+    LARGEST_TENSION, LENGTH_TOLERANCE, steps_between, TYPICAL_COMPLIANCE)
 
 # Stiffness of load cell, capstan and servo motor [N/m].
 BENCH_STIFFNESS = 5e3
@@ -96,7 +96,7 @@ class Bench:
     def _hold(self, voltages, hold, equilibrium, tension):
         """Heat and cool, then hold each voltage and yield the tension at its end."""
         conditions, heat, muscle = self.conditions, self.conditions.heat, self._muscle
-        muscle.heat_and_cool(ROOM)
+        muscle.heat_and_cool(ROOM, tension)
         temperature = ROOM
         muscle.commit(temperature, [tension])
         count = math.ceil(hold / CREEPING_DT) if conditions.creep > 0.0 else 1
@@ -104,9 +104,11 @@ class Bench:
             balance = heat.balance(voltage * voltage, ROOM)
             fluctuation = conditions.air.turbulence * self._rng.standard_normal()
             for _ in range(count):
-                temperature = heat.advance(temperature, balance + fluctuation, hold / count)
+                before = temperature
+                temperature = heat.advance(before, balance + fluctuation, hold / count)
                 muscle.age(voltage, hold / count)
-                tension = equilibrium(temperature, tension)
-                muscle.commit(temperature, [tension])
+                for one in steps_between(before, temperature, conditions.material.temperature_step):
+                    tension = equilibrium(one, tension)
+                    muscle.commit(one, [tension])
             self._temperature = temperature
             yield tension

@@ -9,9 +9,10 @@ What an arm is really like: each value is that of a perfect arm unless an effect
 import dataclasses
 import math
 
+from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.heat import HeatBalance, ROOM
 from hysteresis_ros.laboratory.linkage import Linkage
-from hysteresis_ros.laboratory.wire import WireMaterial
+from hysteresis_ros.laboratory.wire import Material
 
 # Resistance of a wire when it is austenite [Ohm], and the board's full voltage [V].
 RESISTANCE = 8.0
@@ -92,7 +93,7 @@ class Conditions:
 
     Parameters
     ----------
-    material : WireMaterial
+    material : Material
         Of the wires on the arm.
     linkage : Linkage
         Dimensions and masses.
@@ -134,7 +135,7 @@ class Conditions:
         Time over which slow things happen on this arm [s]: about the length of a recording.
     """
 
-    material: WireMaterial = WireMaterial()
+    material: Material = GrainMaterial()
     linkage: Linkage = Linkage()
     heat: HeatBalance = dataclasses.field(default_factory=HeatBalance)
     air: Air = dataclasses.field(default_factory=Air)

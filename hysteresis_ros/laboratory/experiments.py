@@ -34,9 +34,10 @@ GEOMETRY_FILE = 'geometry.yaml'
 Table = dict[str, np.ndarray]
 
 
-def bench_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
+def bench_tables(effects: Mapping[str, float], seed: int,
+                 muscle: str = 'grains') -> dict[str, Table]:
     """Return the tables of the bench, by file name."""
-    plant = Plant(seed, effects)
+    plant = Plant(seed, effects, muscle=muscle)
     rng = np.random.default_rng([seed, 21])
     oscillation = sequences.damped_oscillation()
     force, length = [], []
@@ -53,20 +54,22 @@ def bench_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
             'length.csv': _stack(length, ['trial', 'step', 'voltage', 'force', 'length'])}
 
 
-def arm_step_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
+def arm_step_tables(effects: Mapping[str, float], seed: int,
+                    muscle: str = 'grains') -> dict[str, Table]:
     """Return the tables of settled steps of the arm, by file name."""
     kinds = (sequences.sinusoid, sequences.random_moves, sequences.staircase,
              sequences.up_and_down)
 
     def record(recording):
         rng = np.random.default_rng([seed, recording, 22])
-        plant = Plant(seed, effects, recording=recording,
+        plant = Plant(seed, effects, recording=recording, muscle=muscle,
                       recording_time=HOLD * ARM_STEPS * len(kinds))
         return [plant.arm_trial(kind(ARM_STEPS, rng)) for kind in kinds]
     return _recordings(record)
 
 
-def arm_dynamic_tables(effects: Mapping[str, float], seed: int) -> dict[str, Table]:
+def arm_dynamic_tables(effects: Mapping[str, float], seed: int,
+                       muscle: str = 'grains') -> dict[str, Table]:
     """Return the tables of continuous recordings of the arm, by file name."""
     kinds = (sequences.steps_of_all_speeds, sequences.repeated_loop, sequences.ramps,
              sequences.long_holds)
@@ -75,7 +78,8 @@ def arm_dynamic_tables(effects: Mapping[str, float], seed: int) -> dict[str, Tab
         rng = np.random.default_rng([seed, recording, 23])
         runs = [kind(rng) for kind in kinds]
         plant = Plant(seed, effects, heat_time_constant=BRISK, recording=recording,
-                      recording_time=sequences.SAMPLING * sum(len(run) for run in runs))
+                      recording_time=sequences.SAMPLING * sum(len(run) for run in runs),
+                      muscle=muscle)
         return [plant.arm_run(np.round(sequences.SAMPLING * np.arange(1, len(run) + 1), 3), run)
                 for run in runs]
     return _recordings(record)
@@ -98,7 +102,7 @@ EXPERIMENTS = {'bench': bench_tables, 'arm-steps': arm_step_tables,
 
 
 def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
-                      seed: int = 0) -> dict[str, Table]:
+                      seed: int = 0, muscle: str = 'grains') -> dict[str, Table]:
     """
     Carry an experiment out and return its tables.
 
@@ -110,6 +114,8 @@ def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
         Strengths of hidden effects. On the bench only those of the wire itself act.
     seed : int
         Of specimen, noise and random sequences.
+    muscle : str
+        Constitutive model of the wires: grains, brinson or lagoudas.
 
     Returns
     -------
@@ -119,22 +125,23 @@ def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
     Raises
     ------
     ParameterError
-        For an experiment or an effect that does not exist.
+        For an experiment, an effect or a muscle that does not exist, or an effect that the muscle
+        cannot have.
     """
     if name not in EXPERIMENTS:
         raise ParameterError(f'laboratory: there is no protocol {name!r}; '
                              f'there are {", ".join(EXPERIMENTS)}')
-    return EXPERIMENTS[name](effects or {}, seed)
+    return EXPERIMENTS[name](effects or {}, seed, muscle)
 
 
 def write_experiment(name: str, directory, effects: Mapping[str, float] | None = None,
-                     seed: int = 0) -> list[Path]:
+                     seed: int = 0, muscle: str = 'grains') -> list[Path]:
     """
     Carry an experiment out and write its tables.
 
     Parameters
     ----------
-    name, effects, seed
+    name, effects, seed, muscle
         As for `experiment_tables`.
     directory : str or Path
         Made where it is missing.
@@ -147,11 +154,12 @@ def write_experiment(name: str, directory, effects: Mapping[str, float] | None =
     Raises
     ------
     ParameterError
-        For an experiment or an effect that does not exist.
+        For an experiment, an effect or a muscle that does not exist, or an effect that the muscle
+        cannot have.
     OSError
         If a file cannot be written.
     """
-    tables = experiment_tables(name, effects, seed)
+    tables = experiment_tables(name, effects, seed, muscle)
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     for file, columns in tables.items():

@@ -21,8 +21,6 @@ from hysteresis_ros.laboratory.unlisted import UNLISTED
 
 # Specimens differ in an effect's size by up to this share.
 SPREAD = 0.15
-# Angles between which the clean arm moves [deg].
-LOWERED, RAISED = 141.6, 94.2
 # Enthalpy of the transformation [J/kg].
 ENTHALPY = 24e3
 
@@ -97,25 +95,18 @@ def _airflow(conditions, size, specimen, recording):
     conditions.heat.airflow *= factor if size > 0.0 else 1.0 / factor
 
 
-def _change_material(conditions, **values):
-    conditions.material = dataclasses.replace(conditions.material, **values)
-
-
 def _stress_dependence(conditions, size, specimen, recording):
     factor = 1.0 + 0.35 * abs(size)
-    _change_material(conditions, clausius_clapeyron=conditions.material.clausius_clapeyron
-                     * (1.0 / factor if size > 0.0 else factor))
+    conditions.material = conditions.material.with_slopes(
+        1.0 / factor if size > 0.0 else factor)
 
 
 def _stress_dependent_strain(conditions, size, specimen, recording):
-    material = conditions.material
-    growth = material.largest_strain - material.strain_without_load
-    _change_material(
-        conditions, largest_strain=material.strain_without_load + growth * (1.0 + 0.5 * size))
+    conditions.material = conditions.material.with_strain_growth(1.0 + 0.5 * size)
 
 
 def _r_phase(conditions, size, specimen, recording):
-    _change_material(conditions, early_strain=0.0085 * size)
+    conditions.material = conditions.material.with_early_phase(0.0085 * size)
 
 
 def _creep(conditions, size, specimen, recording):
@@ -174,9 +165,10 @@ def _frame_tilt(conditions, size, specimen, recording):
 
 
 def _end_stop(conditions, size, specimen, recording):
-    cut = 0.25 * abs(size) * (LOWERED - RAISED)
+    lowered, raised = conditions.material.arm_range
+    cut = 0.25 * abs(size) * (lowered - raised)
     conditions.stop_side = 1 if size > 0.0 else -1
-    conditions.stop = math.radians(LOWERED - cut if size > 0.0 else RAISED + cut)
+    conditions.stop = math.radians(lowered - cut if size > 0.0 else raised + cut)
 
 
 def _encoder_offset(conditions, size, specimen, recording):

@@ -3,10 +3,10 @@
 """The wires of the arm: side by side on one clamp, with what time and use do to them."""
 
 import math
+from collections.abc import Callable
 
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.heat import ROOM
-from hysteresis_ros.laboratory.wire import Wire
 
 # A setpoint that changes by less than this [V] within one dt is held.
 HELD = 6e-3
@@ -33,17 +33,46 @@ class ParallelWires:
 
     def __init__(self, conditions: Conditions):
         self._conditions = conditions
-        self.wires = [Wire(conditions.material) for _ in conditions.wire_offsets]
+        self.wires = [conditions.material.wire() for _ in conditions.wire_offsets]
         self.count = conditions.linkage.muscle_count
         self.cycles = 0.0
         for wire in self.wires:
             wire.compliance = conditions.compliance
         self.heat_and_cool()
 
-    def heat_and_cool(self, temperature: float = ROOM) -> None:
-        """Wipe the memory by a full heat and cool cycle; what use has done stays."""
+    def heat_and_cool(self, temperature: float = ROOM, tension: float | None = None) -> None:
+        """
+        Wipe the memory by a full heat and cool cycle; what use has done stays.
+
+        Parameters
+        ----------
+        temperature : float
+            Temperature at the end [degC].
+        tension : float or None
+            Tension of each wire meanwhile [N]; the pretension by default.
+        """
         for wire in self.wires:
-            wire.heat_and_cool(temperature)
+            wire.heat_and_cool(temperature, tension)
+        self._begin()
+
+    def cool_down(self, temperatures: list, balance: Callable[[float], None]) -> None:
+        """
+        Let the wires cool in balance with their load; not counted as use.
+
+        Parameters
+        ----------
+        temperatures : list of float
+            From hot to cold [degC].
+        balance : callable
+            Brings the wires to rest at a temperature.
+        """
+        cycles = self.cycles
+        for temperature in temperatures:
+            balance(temperature)
+        self.cycles = cycles
+        self._begin()
+
+    def _begin(self) -> None:
         self._share = self.martensite
         self._run_share = self._share
         self._voltage = 0.0

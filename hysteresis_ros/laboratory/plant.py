@@ -15,7 +15,6 @@ wires stays, while every trial starts from the cold state after a full heat and 
 recording is made on an arm of the same build with fresh wires.
 """
 
-import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
@@ -24,16 +23,21 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.bench import Bench, HOLD
+from hysteresis_ros.laboratory.brinson import BrinsonMaterial
 from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.heat import HeatBalance
 from hysteresis_ros.laboratory.hidden_physics import apply_effects
-from hysteresis_ros.laboratory.wire import WireMaterial
+from hysteresis_ros.laboratory.lagoudas import LagoudasMaterial
+from hysteresis_ros.laboratory.wire import Material
 
 # Time constants of Eq. 1 [s]: in the paper, and in continuous recordings.
 PAPER, BRISK = 5.0, 0.02
+# Constitutive models of the wire.
+MUSCLES = {kind.name: kind for kind in (GrainMaterial, BrinsonMaterial, LagoudasMaterial)}
 
 
-def specimen(seed: int) -> WireMaterial:
+def specimen(seed: int, muscle: str = 'grains') -> Material:
     """
     Return the material of one batch of wire, which differs a little from the next.
 
@@ -41,25 +45,18 @@ def specimen(seed: int) -> WireMaterial:
     ----------
     seed : int
         Which batch.
-    """
-    rng = np.random.default_rng([seed, 101])
+    muscle : str
+        Constitutive model, a key of `MUSCLES`.
 
-    def vary(value, share):
-        return value * (1.0 + share * rng.uniform(-1.0, 1.0))
-    usual = WireMaterial()
-    grains = dataclasses.replace(
-        usual.grains, start=usual.grains.start + rng.uniform(0.0, 1.5),
-        spread=vary(usual.grains.spread, 0.06), shape=vary(usual.grains.shape, 0.05),
-        tail=vary(usual.grains.tail, 0.08), loop=vary(usual.grains.loop, 0.05),
-        loop_growth=vary(usual.grains.loop_growth, 0.08))
-    return dataclasses.replace(
-        usual, grains=grains, grain_offset=rng.uniform(),
-        austenite_modulus=vary(usual.austenite_modulus, 0.04),
-        martensite_modulus=vary(usual.martensite_modulus, 0.04),
-        strain_without_load=vary(usual.strain_without_load, 0.03),
-        largest_strain=vary(usual.largest_strain, 0.02),
-        orienting_stress=vary(usual.orienting_stress, 0.08),
-        clausius_clapeyron=vary(usual.clausius_clapeyron, 0.03))
+    Raises
+    ------
+    ParameterError
+        For a muscle that does not exist.
+    """
+    if muscle not in MUSCLES:
+        raise ParameterError(f'laboratory: there is no muscle {muscle!r}; '
+                             f'there are {", ".join(MUSCLES)}')
+    return MUSCLES[muscle].specimen(np.random.default_rng([seed, 101]))
 
 
 class Plant:
@@ -79,16 +76,19 @@ class Plant:
         Which recording of the same specimen: another one has other noise.
     recording_time : float
         About how long a recording on the arm takes [s], for slow and rare effects.
+    muscle : str
+        Constitutive model of the wires, a key of `MUSCLES`.
 
     Raises
     ------
     ParameterError
-        For an effect that does not exist or a number that makes no sense.
+        For an effect or a muscle that does not exist, an effect that the muscle cannot have,
+        or a number that makes no sense.
     """
 
     def __init__(self, seed: int = 0, effects: Mapping[str, float] | None = None,
                  heat_time_constant: float = PAPER, recording: int = 0,
-                 recording_time: float = 900.0):
+                 recording_time: float = 900.0, muscle: str = 'grains'):
         if seed < 0 or recording < 0:
             raise ParameterError(f'laboratory: seeds must not be negative, not {seed}, {recording}')
         if not (heat_time_constant > 0.0 and recording_time > 0.0):
@@ -96,7 +96,7 @@ class Plant:
                                  f'{heat_time_constant!r}, {recording_time!r}')
         self.seed = seed
         self.effects = dict(effects or {})
-        self.material = specimen(seed)
+        self.material = specimen(seed, muscle)
         bench = apply_effects(Conditions(material=self.material), self.effects, seed, bench=True)
         conditions = Conditions(material=self.material, recording_time=recording_time,
                                 heat=HeatBalance(time_constant=heat_time_constant))

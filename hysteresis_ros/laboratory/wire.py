@@ -1,24 +1,20 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One shape memory wire: how long it is at a temperature and a tension, after all that was before.
+What every wire of the laboratory can do, whichever constitutive equations it follows.
 
-The strain is what the two phases in series stretch elastically, and the transformation strain of
-the martensite, which grows with the stress that orients it and saturates::
-
-    strain = sigma (x / E_M + (1 - x) / E_A) + H(sigma) x,      x the martensite share
-    H(sigma) = H_min + (H_max - H_min) (1 - exp(-sigma / sigma_H))
-
-Even without load a trained wire shortens when heated (H_min > 0). Elongation is counted from the
-resting length, which is that of the cold wire under its pretension.
+Bench and arm ask a wire how long it would be at a temperature and a tension, and bring it there.
+A constitutive model is a `Material`, which holds constants and makes wires, and a `Wire`, which has
+the state; elongation is counted from the resting length, that of the cold wire under pretension.
 """
 
-import dataclasses
+import abc
 import math
+from typing import ClassVar
 
 import numpy as np
 
-from hysteresis_ros.laboratory.grains import GrainDistribution, Grains
+from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.solve import RootFinder
 
 # Largest tension considered [N]; far above what any bench or arm here asks for.
@@ -29,120 +25,104 @@ LENGTH_TOLERANCE = 5e-8
 TYPICAL_COMPLIANCE = 4e-4
 
 
-@dataclasses.dataclass(frozen=True)
-class WireMaterial:
+class Material(abc.ABC):
     """
-    Constants of one 0.203 mm Flexinol wire of 0.27 m.
+    Constants of one batch of wire.
 
-    Parameters
+    Attributes
     ----------
+    name : str
+        What users call the constitutive model.
     resting_length, diameter : float
         Cold length under the pretension, and thickness [m].
     pretension : float
         Tension at which the resting length is measured [N].
-    austenite_modulus, martensite_modulus : float
-        Young's moduli of the two phases [Pa].
-    strain_without_load, largest_strain : float
-        Transformation strains H_min and H_max.
-    orienting_stress : float
-        Stress sigma_H over which the transformation strain saturates [Pa].
-    clausius_clapeyron : float
-        Stress that shifts the transformation to austenite by one kelvin, C [Pa/K].
-    cooling_ratio : float
-        C of the transformation back over that.
-    grains : GrainDistribution
-        Transformation temperatures at zero stress.
-    grain_count : int
-        Number of grains.
-    grain_offset : float
-        What tells the grains of one specimen from those of another, in [0, 1).
-    early_strain : float
-        Strain of an R-phase that comes before the martensite, nearly without hysteresis; 0: none.
-    early_temperature, early_loop, early_spread : float
-        Heating temperature of the R-phase's middle, its hysteresis, and its spread [degC, K, K].
-    early_clausius_clapeyron : float
-        C of the R-phase, steeper than that of the martensite [Pa/K].
+    temperature_step : float
+        Largest change of temperature [K] that is taken at once where the tension changes along:
+        finite where the strain depends on the tension at which the martensite has formed.
+    arm_range : tuple of float
+        About where an arm of such wires stands without voltage and at 6 V [deg].
     """
 
-    resting_length: float = 0.27
-    diameter: float = 0.203e-3
-    pretension: float = 0.5
-    austenite_modulus: float = 62e9
-    martensite_modulus: float = 32e9
-    strain_without_load: float = 0.0315
-    largest_strain: float = 0.0575
-    orienting_stress: float = 110e6
-    clausius_clapeyron: float = 7.0e6
-    cooling_ratio: float = 1.03
-    grains: GrainDistribution = GrainDistribution()
-    grain_count: int = 400
-    grain_offset: float = 0.0
-    early_strain: float = 0.0
-    early_temperature: float = 45.0
-    early_loop: float = 3.0
-    early_spread: float = 6.0
-    early_clausius_clapeyron: float = 16e6
+    name: ClassVar[str]
+    temperature_step: ClassVar[float] = math.inf
+    arm_range: ClassVar[tuple[float, float]]
+    resting_length: float
+    diameter: float
+    pretension: float
 
     @property
     def section(self) -> float:
         """Cross section [m^2]."""
         return 0.25 * math.pi * self.diameter ** 2
 
-    def transformation_strain(self, stress: float) -> float:
-        """Return H(sigma) for a stress [Pa]."""
-        return self.strain_without_load + (self.largest_strain - self.strain_without_load) * (
-            1.0 - math.exp(-max(stress, 0.0) / self.orienting_stress))
+    @classmethod
+    @abc.abstractmethod
+    def specimen(cls, rng: np.random.Generator) -> 'Material':
+        """Return a batch that differs a little from the next."""
 
-    def strain(self, martensite: float, early: float, stress: float) -> float:
-        """
-        Return the strain against the unloaded austenite.
+    @abc.abstractmethod
+    def wire(self) -> 'Wire':
+        """Return a new wire, cold."""
 
-        Parameters
-        ----------
-        martensite, early : float
-            Shares of martensite and of R-phase (or beyond) in [0, 1].
-        stress : float
-            Tension over cross section [Pa].
-        """
-        compliance = (martensite / self.martensite_modulus
-                      + (1.0 - martensite) / self.austenite_modulus)
-        return (stress * compliance + self.transformation_strain(stress) * martensite
-                + self.early_strain * early)
+    def with_slopes(self, factor: float) -> 'Material':
+        """Return the same with all Clausius-Clapeyron slopes times a factor."""
+        raise self._lacks('stress_dependence')
+
+    def with_strain_growth(self, factor: float) -> 'Material':
+        """Return the same with the transformation strain's growth with stress times a factor."""
+        raise self._lacks('stress_dependent_strain')
+
+    def with_early_phase(self, strain: float) -> 'Material':
+        """Return the same with an R-phase of a strain before the martensite."""
+        raise self._lacks('r_phase')
+
+    def _lacks(self, effect: str) -> ParameterError:
+        return ParameterError(f'laboratory: a {self.name} muscle cannot have {effect}: its '
+                              'constitutive equations have no such constant; choose another '
+                              'muscle or effect')
 
 
-class Wire:
+class Wire(abc.ABC):
     """
     One wire with its memory.
 
     Parameters
     ----------
-    material : WireMaterial
+    material : Material
         Constants of this specimen.
 
     Attributes
     ----------
     retained : float
-        Share of the grains that stay martensite for good, as use makes them.
+        Share of the wire that stays martensite for good, as use makes it.
     excess : float
         Length that the wire has beyond its elongation: dead length, creep [m].
     compliance : float
         Of crimps and cable in series with the wire [m/N].
     """
 
-    def __init__(self, material: WireMaterial):
+    def __init__(self, material: Material):
         self.material = material
         self.retained = 0.0
         self.excess = 0.0
         self.compliance = 0.0
-        self._heating, self._cooling = material.grains.temperatures(
-            material.grain_count, material.grain_offset)
-        self._shift = 1.0 / (material.section * material.clausius_clapeyron)
-        self._cooling_shift = self._shift / material.cooling_ratio
-        self._early_shift = 1.0 / (material.section * material.early_clausius_clapeyron)
+        self._section = material.section
+        self._length = material.resting_length
         self._find = RootFinder(TYPICAL_COMPLIANCE, LENGTH_TOLERANCE)
-        self._rest = material.strain(1.0, 1.0, material.pretension / material.section)
+        self._rest = self._resting_strain()
         self.heat_and_cool()
 
+    @property
+    @abc.abstractmethod
+    def martensite(self) -> float:
+        """Martensite share after the last `commit`."""
+
+    @abc.abstractmethod
+    def peek_martensite(self, temperature: float, tension: float) -> float:
+        """Return the martensite share at a temperature [degC] and tension [N]; memory stays."""
+
+    @abc.abstractmethod
     def heat_and_cool(self, temperature: float = 22.0, tension: float | None = None) -> None:
         """
         Heat until all is austenite, cool, and so wipe the memory.
@@ -154,25 +134,18 @@ class Wire:
         tension : float or None
             Tension meanwhile [N]; the pretension by default.
         """
-        material = self.material
-        self._grains = Grains(self._heating, self._cooling)
-        self._early = None
-        if material.early_strain > 0.0:
-            middle = material.early_temperature + material.early_spread * np.linspace(-1.0, 1.0, 40)
-            self._early = Grains(middle, middle - material.early_loop)
-        tension = material.pretension if tension is None else tension
-        self.commit(float(self._heating.max()) + self._shift * tension + 20.0, tension)
-        self.commit(temperature, tension)
 
-    @property
-    def martensite(self) -> float:
-        """Martensite share after the last `commit`."""
-        return self._martensite
+    @abc.abstractmethod
+    def _resting_strain(self) -> float:
+        """Return the strain of the cold wire under its pretension."""
 
-    def peek_martensite(self, temperature: float, tension: float) -> float:
-        """Return the martensite share at a temperature [degC] and tension [N]; memory stays."""
-        return self._grains.peek(temperature - self._shift * tension,
-                                 temperature - self._cooling_shift * tension)
+    @abc.abstractmethod
+    def _peek_strain(self, temperature: float, stress: float) -> float:
+        """Return the strain at a temperature [degC] and stress [Pa]; memory stays."""
+
+    @abc.abstractmethod
+    def _commit_strain(self, temperature: float, stress: float) -> float:
+        """Bring the wire to a temperature [degC] and stress [Pa] and return its strain."""
 
     def elongation(self, temperature: float, tension: float) -> float:
         """
@@ -185,21 +158,11 @@ class Wire:
         tension : float
             Tension [N], at least 0.
         """
-        early = 1.0
-        if self._early is not None:
-            felt = temperature - self._early_shift * tension
-            early = self._early.peek(felt, felt)
-        return self._length(self.peek_martensite(temperature, tension), early, tension)
+        return self._elongation(self._peek_strain(temperature, tension / self._section), tension)
 
     def commit(self, temperature: float, tension: float) -> float:
         """Bring the wire there, memory included, and return its elongation [m]."""
-        self._martensite = self._grains.commit(temperature - self._shift * tension,
-                                               temperature - self._cooling_shift * tension)
-        early = 1.0
-        if self._early is not None:
-            felt = temperature - self._early_shift * tension
-            early = self._early.commit(felt, felt)
-        return self._length(self._martensite, early, tension)
+        return self._elongation(self._commit_strain(temperature, tension / self._section), tension)
 
     def tension(self, temperature: float, elongation: float, guess: float = 1.0) -> float:
         """
@@ -222,9 +185,20 @@ class Wire:
         return self._find(lambda force: self.elongation(temperature, force) - elongation,
                           guess, 0.0, LARGEST_TENSION)
 
-    def _length(self, martensite: float, early: float, tension: float) -> float:
-        material = self.material
-        martensite = self.retained + (1.0 - self.retained) * martensite
-        strain = material.strain(martensite, early, tension / material.section)
-        return (material.resting_length * (strain - self._rest) + self.excess
-                + self.compliance * tension)
+    def _elongation(self, strain: float, tension: float) -> float:
+        return self._length * (strain - self._rest) + self.excess + self.compliance * tension
+
+
+def steps_between(before: float, after: float, largest: float) -> list[float]:
+    """
+    Return temperatures on the way from one to another, the last of them included.
+
+    Parameters
+    ----------
+    before, after : float
+        Temperatures [degC].
+    largest : float
+        Largest step [K]; infinite: go there at once.
+    """
+    count = max(math.ceil(abs(after - before) / largest), 1)
+    return [before + (after - before) * number / count for number in range(1, count)] + [after]

@@ -8,6 +8,7 @@ key             meaning
 =============== ===================================================================================
 speed           how much faster than the wall's clock the arm lives (0.01 to 1000; 1)
 seed            which specimen of arm and wire, and all that is random (0)
+muscle          constitutive model of the wires: grains, brinson or lagoudas (grains)
 recording       which recording on that specimen: another one has other noise (0)
 recording_time  how long it takes, about, in s, for effects that are slow or rare (900)
 time_constant   of the wires' heating and cooling in s (0.05 to 100; 5 as in the paper)
@@ -68,6 +69,7 @@ class Simulation:
     deaf_after: float = math.inf
     deaf_for: float = math.inf
     effects: dict = dataclasses.field(default_factory=dict)
+    muscle: str = 'grains'
 
 
 def parse_url(url: str) -> Simulation:
@@ -96,14 +98,16 @@ def parse_url(url: str) -> Simulation:
     for key, text in parse_qsl(parts.query, keep_blank_values=True):
         if key in values or key in effects:
             raise ParameterError(f'port {url}: {key} is given twice')
-        if key in _RANGES:
+        if key == 'muscle':
+            values[key] = text
+        elif key in _RANGES:
             values[key] = _number(url, key, text, _RANGES[key])
         elif key in EFFECTS:
             effects[key] = _number(url, key, text, _STRENGTHS)
         else:
             raise ParameterError(
-                f'port {url}: there is no {key!r}; keys are {", ".join(_RANGES)}, and the '
-                'effects that `hysteresis effects` lists')
+                f'port {url}: there is no {key!r}; keys are {", ".join(_RANGES)}, muscle, '
+                'and the effects that `hysteresis effects` lists')
     return Simulation(**values, effects=effects)
 
 
@@ -123,11 +127,12 @@ def make_plant(simulation: Simulation) -> Plant:
     Raises
     ------
     ParameterError
-        If an effect cannot have this strength.
+        If an effect cannot have this strength, or there is no such muscle, or it cannot have the
+        effect.
 
     """
     return Plant(simulation.seed, simulation.effects, simulation.time_constant,
-                 simulation.recording, simulation.recording_time)
+                 simulation.recording, simulation.recording_time, simulation.muscle)
 
 
 def check_url(url: str) -> None:
@@ -142,7 +147,7 @@ def check_url(url: str) -> None:
     Raises
     ------
     ParameterError
-        If the arm, a key, a value or an effect's strength is not known.
+        If the arm, a key, a value, an effect's strength or the muscle is not known.
 
     """
     make_plant(parse_url(url))
