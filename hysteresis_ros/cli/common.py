@@ -8,8 +8,7 @@ import sys
 
 from hysteresis_ros.atomic import write_text
 from hysteresis_ros.cli.outputs import InputPath, OutputFile, OutputFileOrStdout
-from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.measurements import read_measurement, settled_rows
+from hysteresis_ros.measurements import read_measurement
 
 
 def one_line(text):
@@ -102,17 +101,7 @@ def read_all(paths, namespace=None, settled=False):
         If one cannot be read, or has no settled states.
 
     """
-    found = []
-    for path in progress(paths, 'reading'):
-        measurement = read_measurement(path, namespace)
-        if settled:
-            reduced = settled_rows(measurement)
-            if reduced is None:
-                raise MeasurementError(f'{path}: the drive is not held for 20 s at a time, so '
-                                       'there are no settled states; leave --settled out')
-            measurement = reduced
-        found.append(measurement)
-    return found
+    return [read_measurement(path, namespace, settled) for path in progress(paths, 'reading')]
 
 
 def progress(items, what, total=None):

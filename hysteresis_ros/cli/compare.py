@@ -47,7 +47,7 @@ def run(args):
     if args.plots:
         Path(args.plots).mkdir(parents=True, exist_ok=True)
     if args.json:
-        write_json(args.json, comparison.to_json())
+        write_json(args.json, comparison.to_dict())
     if args.report or args.plots:
         draw(args, comparison, steps)
 

@@ -30,18 +30,15 @@ def add_parser(subparsers):
 
 def run(args):
     """Do it."""
-    from hysteresis_ros.diagnosis.diagnose import diagnose
-    from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.api import diagnose, load_model
 
-    model = MuscleModel.load(args.model)
+    model = load_model(args.model)
     measurements = read_all(args.data, args.namespace, args.settled)
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed,
                      progress=lambda items, total: progress(items, 'effects', total))
     say(args, to_text(found, measurements[-1].response))
     if args.json:
-        from hysteresis_ros.comparison.compare import compare
-        where = compare(model, measurements).to_json()['where']
-        write_json(args.json, {**found.to_json(), 'where': where})
+        write_json(args.json, found.to_dict())
     if args.report:
         from hysteresis_ros.report.diagnosis_page import write_diagnosis
         write_diagnosis(args.report, model, measurements, found, args.model)

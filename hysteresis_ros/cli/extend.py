@@ -45,7 +45,7 @@ def run(args):
     say(args, to_text(extension, train[0].response))
     say(args, f'\nWritten to {args.output}')
     if args.json:
-        write_json(args.json, extension.to_json())
+        write_json(args.json, extension.to_dict())
     if args.report:
         from hysteresis_ros.report.diagnosis_page import write_extension
         write_extension(args.report, model, extension, train, test, args.output)

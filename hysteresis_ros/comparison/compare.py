@@ -4,21 +4,26 @@
 
 from dataclasses import dataclass, field
 import os
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.measurements.metrics import Errors, errors, finite, Floor, noise_floor
 from hysteresis_ros.comparison.signals import signals_of
 from hysteresis_ros.comparison.where import blocks_of, number, regions
-from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.measurements.holds import hold_ends, mean_of_windows
 from hysteresis_ros.measurements.quantities import QUANTITIES, shown
+from hysteresis_ros.result import Brief, Result
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FAR_OUTSIDE = 30.0
 """A recording that exceeds the identified range by this factor is probably in another unit."""
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Result):
     """
     A model and what was measured, over all rows of all recordings.
 
@@ -94,7 +99,7 @@ class Comparison:
         """Measured less predicted, ndarray of float64 (rows,)."""
         return self.measured - self.predicted
 
-    def to_json(self):
+    def to_dict(self):
         """
         Return the comparison as plain types, without the rows themselves.
 
@@ -104,21 +109,61 @@ class Comparison:
 
         """
         def named(values):
-            return None if values is None else values.to_json()
+            return None if values is None else values.to_dict()
 
         return {
             'rows': self.rows, 'quantity': self.quantity, 'unit': self.unit,
-            'model': self.model.to_json(), 'linear': named(self.linear),
-            'by_trial': [{**entry, 'model': entry['model'].to_json(),
+            'model': self.model.to_dict(), 'linear': named(self.linear),
+            'by_trial': [{**entry, 'model': entry['model'].to_dict(),
                           'linear': named(entry['linear'])} for entry in self.by_trial],
-            'where': [region.to_json() for region in self.where],
+            'where': [region.to_dict() for region in self.where],
             'name': self.name, 'continuous': self.continuous,
-            'extensions': [{'name': name, **values.to_json()}
+            'extensions': [{'name': name, **values.to_dict()}
                            for name, values in self.extensions],
             'settled': {key: value if key == 'rows' else named(value)
                         for key, value in self.settled.items()} or None,
             'noise_floor': {'rmse': finite(self.floor.value), 'origin': self.floor.origin},
             'warnings': list(self.warnings), 'sources': list(self.sources)}
+
+    def brief(self) -> Brief:
+        """Return the RMSE and where the model fails most, with the table of errors."""
+        unit, scale = shown(self.quantity)
+        others = [f'noise floor {number(scale * self.floor.value)} {unit}']
+        if self.linear is not None:
+            others.insert(0, f'linear {number(scale * self.linear.rmse)} {unit}')
+        lines = [f'Comparison of {self.name}: {self.quantity}, {self.rows} rows of '
+                 f'{len(self.by_trial)} trials',
+                 f'RMSE {number(scale * self.model.rmse)} {unit} ({", ".join(others)})']
+        lines += [f'where: {region.text}' for region in self.where[:1]]
+        return Brief(lines, *self.table())
+
+    def plot(self, name: str = 'overlay') -> 'Figure':
+        """
+        Draw one of the comparison's pictures.
+
+        Parameters
+        ----------
+        name : str
+            `overlay` (measured and predicted, and the residual below), `signals` (the residual
+            against every signal), `loop`, `coverage`, and where there is what they need
+            `waterfall`, `plane`, `since_step`, `correlogram`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ParameterError
+            If there is no such picture of this comparison.
+
+        """
+        from hysteresis_ros.report.plots import figures
+        drawn = figures(self)
+        if name not in drawn:
+            raise ParameterError(f'no picture {name!r} of this comparison; there are '
+                                 f'{", ".join(drawn)}')
+        return drawn[name]
 
     def table(self):
         """

@@ -84,7 +84,7 @@ class Region(NamedTuple):
     share: float
     text: str
 
-    def to_json(self):
+    def to_dict(self):
         """Return the entry of `where` in the JSON of compare."""
         return {'signal': self.signal, 'from': finite(self.low), 'to': finite(self.high),
                 'mean_residual': finite(self.mean_residual), 'rmse': finite(self.rmse),

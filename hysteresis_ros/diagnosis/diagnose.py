@@ -52,9 +52,9 @@ def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
     """
     problem = problem_for(model, measurements, effects, jobs)
     rng = np.random.default_rng(seed)
-    if problem.refits:
-        return bench_verdict(problem, settings, rng, jobs, progress)
-    return arm_verdict(problem, settings, rng, progress)
+    found = (bench_verdict(problem, settings, rng, jobs, progress) if problem.refits
+             else arm_verdict(problem, settings, rng, progress))
+    return dataclasses.replace(found, quantity=problem.response)
 
 
 def with_settings(**changes) -> Settings:

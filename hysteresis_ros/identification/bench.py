@@ -11,25 +11,31 @@ applied to a saturated memory.
 
 import dataclasses
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros import __version__
 from hysteresis_ros.measurements.metrics import errors
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
-from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.errors import IdentificationError, ParameterError
 from hysteresis_ros.identification.baselines import fit_linear
 from hysteresis_ros.identification.first_stage import first_stage_from_lengths
 from hysteresis_ros.identification.least_squares import WeightFit
 from hysteresis_ros.identification.operators import fit_operator
+from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import MuscleModel
+from hysteresis_ros.result import Brief, Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LEVELS = (10, 20)
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
-@dataclasses.dataclass
-class Identified:
+@dataclasses.dataclass(repr=False)
+class Identified(Result):
     """
     A model with the fits that it came from.
 
@@ -40,11 +46,62 @@ class Identified:
     force_fit, length_fit : WeightFit or None
         Results of the least squares, with rank, cells never excited and intervals; None where the
         stage has no weights or was not identified.
+    force, length : Measurement or None
+        The bench tables, with the rows that verify.
     """
 
     model: MuscleModel
     force_fit: WeightFit | None
     length_fit: WeightFit | None
+    force: Measurement | None = None
+    length: Measurement | None = None
+
+    def to_dict(self) -> dict:
+        """Return plain types for JSON: kind, metrics and effects of the model."""
+        return {'kind': self.model.kind, 'metrics': self.model.metrics,
+                'effects': [effect.to_dict() for effect in self.model.effects]}
+
+    def brief(self) -> Brief:
+        """Return what was identified, with the mean errors as in Table I."""
+        rows = [[f'{name}, {part}', *(
+            '-' if values[of]['mean_percent'] is None else f'{values[of]["mean_percent"]:.2f} %'
+            for of in ('model', 'linear')), str(values['rows'])]
+            for name, entry in self.model.metrics.items() for part, values in entry.items()
+            if isinstance(values, dict) and 'model' in values]
+        effects = ' + '.join(['', *(effect.id for effect in self.model.effects)])
+        lines = [f'Identified: {self.model.kind}{effects}, {self.model.response} of '
+                 f'{self.model.drive}']
+        lines += [f'{row[0]}: mean error {row[1]} (linear {row[2]}), {row[3]} rows'
+                  for row in rows]
+        return Brief(lines, ['mean error', 'model', 'linear', 'rows'], rows)
+
+    def plot(self, table: str | None = None) -> 'Figure':
+        """
+        Draw the loops of a bench table, measured and predicted, and the residual on them.
+
+        Parameters
+        ----------
+        table : {'length', 'force'}, optional
+            Default: the length table, else the force table.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ParameterError
+            If there is no such table.
+
+        """
+        from hysteresis_ros.comparison.compare import compare
+        tables = {name: measurement for name, measurement in (
+            ('length', self.length), ('force', self.force)) if measurement is not None}
+        name = table or next(iter(tables), 'length')
+        if name not in tables:
+            raise ParameterError(f'no {name} table was identified; there is '
+                                 f'{" and ".join(tables) or "none"}')
+        return compare(self.model, [tables[name]]).plot('loop')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -171,7 +228,7 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
         force and force.where(choose_trials(force, force_trials, 'force')))
     model.metrics = measure(model, force, force_trials, length, length_trials)
     model.provenance = _provenance(force, force_trials, length, length_trials)
-    return Identified(model, force_fit, length_fit)
+    return Identified(model, force_fit, length_fit, force, length)
 
 
 def _better_of(length, operators, options):
@@ -302,7 +359,7 @@ def measure(model, force, force_trials, length, length_trials):
         for part, chosen in (('identification', rows), ('verification', ~rows)):
             if np.any(chosen):
                 entry[part] = {
-                    label: errors((predicted[method] - measured)[chosen], span).to_json()
+                    label: errors((predicted[method] - measured)[chosen], span).to_dict()
                     for label, method in (('model', 'preisach'), ('linear', 'linear'))}
                 entry[part]['rmse'] = entry[part]['model']['rmse']
                 entry[part]['rows'] = int(np.count_nonzero(chosen))

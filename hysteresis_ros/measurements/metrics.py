@@ -34,7 +34,7 @@ class Errors(NamedTuple):
     mean_percent: float
     std_percent: float
 
-    def to_json(self):
+    def to_dict(self):
         """Return the numbers by name; those that are not finite become None."""
         return {name: finite(value) for name, value in self._asdict().items()}
 

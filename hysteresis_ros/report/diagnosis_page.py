@@ -10,7 +10,7 @@ from hysteresis_ros.report import page
 from hysteresis_ros.comparison.compare import compare
 from hysteresis_ros.report.comparison_page import CAPTIONS
 from hysteresis_ros.report.drawing import new_figure, png
-from hysteresis_ros.report.plots import figures
+from hysteresis_ros.report.plots import figures, ranking
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.comparison.where import number
 from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
@@ -46,7 +46,7 @@ def write_diagnosis(path, model, measurements, found, model_path) -> None:
     parts += _where(before)
     if found.ranking:
         parts.append(page.section('Effects, by what they do on rows not fitted', page.picture(
-            png(_ranking_figure(found, scale, unit)),
+            png(ranking(found, MOST_ROWS)),
             'Error with each effect added alone, with 95 % intervals; hollow: outside its physical '
             'range. Dashed: the error without it.'), _ranking_table(found, scale, unit)))
     alternatives = [f'{name} cannot be told from {", ".join(others)}' for name, others in zip(
@@ -142,24 +142,6 @@ def _residuals(before, after, scale, unit):
     axis.set_xlabel('row')
     axis.set_ylabel(f'measured less predicted [{unit}]')
     axis.legend(fontsize=8)
-    return figure
-
-
-def _ranking_figure(found, scale, unit):
-    rows = found.ranking[:MOST_ROWS][::-1]
-    figure, axes = new_figure(8.5, 0.8 + 0.28 * len(rows))
-    axis = axes[0, 0]
-    for place, row in enumerate(rows):
-        chosen = row['effect'] in found.missing
-        colour = '#2ca02c' if chosen else AFTER
-        ends = [scale * row['rmse_before'] * (1.0 - row[key]) for key in ('gain_high', 'gain_low')]
-        axis.plot(ends, [place, place], color=colour, lw=2.0 if chosen else 1.2)
-        axis.plot(scale * row['rmse_after'], place, 'o', color=colour,
-                  mfc=colour if row['plausible'] else 'white')
-    axis.axvline(scale * found.rmse_before, color='black', ls='--', lw=0.9)
-    axis.set_yticks(range(len(rows)), [row['effect'] for row in rows])
-    axis.set_xlabel(f'RMSE on rows not fitted [{unit}]')
-    axis.set_xlim(left=0.0)
     return figure
 
 

@@ -8,10 +8,15 @@ no global state.
 """
 
 import base64
+import functools
 import io
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.comparison.signals import label
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MOST_POINTS = 4000
 MOST_DOTS = 5000
@@ -45,11 +50,23 @@ def data_address(picture):
     return 'data:image/png;base64,' + base64.b64encode(picture).decode('ascii')
 
 
-def new_figure(width, height, rows=1, columns=1, **options):
-    """Return a figure and its axes, ndarray of Axes (rows, columns)."""
+@functools.cache
+def figure_class() -> 'type[Figure]':
+    """Return the class of our figures, which a notebook shows without pyplot."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout='constrained')
+    class NotebookFigure(Figure):
+        """A figure that IPython shows as a PNG picture."""
+
+        def _repr_png_(self) -> bytes:
+            return png(self)
+
+    return NotebookFigure
+
+
+def new_figure(width, height, rows=1, columns=1, **options):
+    """Return a figure and its axes, ndarray of Axes (rows, columns)."""
+    figure = figure_class()(figsize=(width, height), layout='constrained')
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     for axis in axes.flat:
         axis.grid(True, color='#dddddd', linewidth=0.6)

@@ -9,6 +9,7 @@ Lines differ in shape and lightness, so that grey print keeps them.
 from hysteresis_ros.report.drawing import axis_label, new_figure, scaled, some_rows, thinned
 from hysteresis_ros.comparison.signals import label
 from hysteresis_ros.comparison.where import binned, blocks_of, correlogram
+from hysteresis_ros.measurements.quantities import shown
 import numpy as np
 
 MEASURED = {'color': '#000000', 'linewidth': 1.3, 'linestyle': '-'}
@@ -17,6 +18,7 @@ LINEAR = {'color': '#d98a1f', 'linewidth': 1.3, 'linestyle': (0, (1, 1))}
 DOTS = {'color': '#9aa7b5', 'markersize': 2.0, 'linestyle': 'none', 'marker': '.', 'alpha': 0.5}
 MEANS = {'color': '#12355b', 'linewidth': 1.4, 'marker': 'o', 'markersize': 3.5, 'capsize': 2.5}
 SIGNED = 'cividis'
+FOUND, TRIED = '#2ca02c', '#1f77b4'
 
 
 def figures(comparison):
@@ -214,8 +216,8 @@ def waterfall(steps, floor, quantity):
     ----------
     steps : list of (str, float)
         What the model had and its RMSE, in the unit of files; the first without the effects.
-    floor : float
-        RMSE that the noise leaves.
+    floor : float or None
+        RMSE that the noise leaves; None where it is not known.
     quantity : str
         The response.
 
@@ -233,13 +235,47 @@ def waterfall(steps, floor, quantity):
     for row, value in enumerate(values):
         axis.annotate(f'{value:.3g}', (value, row), (4, 0), textcoords='offset points',
                       va='center', fontsize=8)
-    axis.axvline(scaled(quantity, floor), color='black', linewidth=1.0, linestyle=':')
-    axis.annotate('noise', (scaled(quantity, floor), -0.5), (3, 0), textcoords='offset points',
-                  fontsize=7, va='bottom')
+    if floor is not None:
+        axis.axvline(scaled(quantity, floor), color='black', linewidth=1.0, linestyle=':')
+        axis.annotate('noise', (scaled(quantity, floor), -0.5), (3, 0),
+                      textcoords='offset points', fontsize=7, va='bottom')
     axis.set_yticks(range(len(steps)), names)
     axis.set_ylim(len(steps) - 0.4, -0.7)
     axis.set_xlim(0, 1.12 * max(float(values.max()), 1e-12))
     axis.set_xlabel(f'RMSE of the {label(quantity)[0]} [{label(quantity)[1] or "1"}]')
+    return figure
+
+
+def ranking(found, most=15):
+    """
+    Draw the error with each effect added alone, with 95 % intervals.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    most : int
+        Effects that are drawn, from the best on.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    unit, scale = shown(found.quantity)
+    rows = found.ranking[:most][::-1]
+    figure, axes = new_figure(8.5, 0.8 + 0.28 * max(len(rows), 2))
+    axis = axes[0, 0]
+    for place, row in enumerate(rows):
+        chosen = row['effect'] in found.missing
+        colour = FOUND if chosen else TRIED
+        ends = [scale * row['rmse_before'] * (1.0 - row[key]) for key in ('gain_high', 'gain_low')]
+        axis.plot(ends, [place, place], color=colour, lw=2.0 if chosen else 1.2)
+        axis.plot(scale * row['rmse_after'], place, 'o', color=colour,
+                  mfc=colour if row['plausible'] else 'white')
+    axis.axvline(scale * found.rmse_before, color='black', ls='--', lw=0.9)
+    axis.set_yticks(range(len(rows)), [row['effect'] for row in rows])
+    axis.set_xlabel(f'RMSE on rows not fitted [{unit or "1"}]')
+    axis.set_xlim(left=0.0)
     return figure
 
 
@@ -356,9 +392,9 @@ def coverage(comparison):
                                f'{comparison.drive}_rate', 'ambient_temperature')
              if name in comparison.signals]
     figure, axes = new_figure(9, 2.6, 1, len(names) + 1, sharey=False)
-    shown = [(name, comparison.signals[name]) for name in names]
-    shown.append((comparison.quantity, comparison.measured))
-    for axis, (name, values) in zip(axes[0], shown):
+    columns = [(name, comparison.signals[name]) for name in names]
+    columns.append((comparison.quantity, comparison.measured))
+    for axis, (name, values) in zip(axes[0], columns):
         low, high = np.quantile(values, [0.002, 0.998])
         axis.hist(scaled(name, np.clip(values, low, high)), bins=30, color='#9db7d3',
                   edgecolor='#12355b', linewidth=0.5)
