@@ -11,8 +11,12 @@ Two watchdogs cut the muscle off. The host's: no `Board.set_voltage` within ``ti
 and 0 is sent. The board's: no setpoint within ``timeouts.watchdog``, and it stops on its own.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
 import threading
 import time
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.bridge.board_clock import BoardClock
 from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
@@ -22,6 +26,9 @@ from hysteresis_ros.bridge.messages import (
     DISABLE, ENABLE, FAULTS, NO, SET, Telemetry, TELEMETRY)
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError
+
+if TYPE_CHECKING:
+    from hysteresis_ros.bridge.protocol import Fields
 
 SUPPLY_SAMPLES = 50         # measurements of the supply over which is averaged, about
 SUPPLY_JUMP = 0.03          # relative change that is taken at once
@@ -76,9 +83,11 @@ class Board:
 
     """
 
-    def __init__(self, port, baud=115200, pwm=Pwm(), encoder=None, timeouts=Timeouts(),
-                 telemetry_period=0.1, supply=12.0, supply_tolerance=0.25,
-                 on_sample=lambda sample: None):
+    def __init__(self, port: str, baud: int = 115200, pwm: Pwm = Pwm(),
+                 encoder: Encoder | None = None, timeouts: Timeouts = Timeouts(),
+                 telemetry_period: float = 0.1, supply: float = 12.0,
+                 supply_tolerance: float = 0.25,
+                 on_sample: Callable[[Sample], None] = lambda sample: None) -> None:
         self.pwm = pwm
         self._encoder = encoder or Encoder()
         self._timeouts = timeouts
@@ -108,19 +117,19 @@ class Board:
                          for target, name in ((self._run, 'board reader'),
                                               (self._write, 'board writer'))]
 
-    def __enter__(self):
+    def __enter__(self) -> 'Board':
         self.start()
         return self
 
-    def __exit__(self, *error):
+    def __exit__(self, *error: object) -> None:
         self.stop()
 
-    def start(self):
+    def start(self) -> None:
         """Begin to look for the board. Returns at once."""
         for thread in self._threads:
             thread.start()
 
-    def stop(self):
+    def stop(self) -> None:
         """
         Switch the output off, wait a moment until the board says so, and close the port.
 
@@ -142,7 +151,7 @@ class Board:
         self._link.close()
         self._online = False
 
-    def set_voltage(self, voltage):
+    def set_voltage(self, voltage: float) -> None:
         """
         Ask for a voltage. Never waits.
 
@@ -162,13 +171,13 @@ class Board:
             self._target = (voltage, time.monotonic())
             self._tell_writer()
 
-    def set_zero(self):
+    def set_zero(self) -> None:
         """Ask for 0 V until the next `set_voltage`. Never waits."""
         with self._wake:
             self._target = None
             self._tell_writer()
 
-    def enable(self, wanted):
+    def enable(self, wanted: bool) -> None:
         """
         Let the board take setpoints, or switch its output off. Never waits.
 
@@ -185,22 +194,22 @@ class Board:
             self._limit = ''
             self._tell_writer()
 
-    def clear_fault(self):
+    def clear_fault(self) -> None:
         """Clear the fault of the encoder's angle, because somebody has checked it."""
         self._encoder.clear_fault()
 
     @property
-    def slowness(self):
+    def slowness(self) -> float:
         """How many seconds of the wall a second of the slower clock takes, at least 1."""
         return 1.0 / min(self.speed, 1.0)
 
     @property
-    def speed(self):
+    def speed(self) -> float:
         """How fast the board's clock runs against the wall's; 1 before the first greeting."""
         return self._identity.speed if self._identity else 1.0
 
     @property
-    def status(self):
+    def status(self) -> Status:
         """How things are, as a `Status`."""
         with self._wake:
             sample = self._sample
@@ -214,17 +223,17 @@ class Board:
                 self._link.lost_frames, self._connections,
                 f'"{bad.text}": {bad.reason}' if bad else '')
 
-    def _tell_writer(self):
+    def _tell_writer(self) -> None:
         self._news = True
         self._wake.notify_all()
 
-    def _expired(self):
+    def _expired(self) -> bool:
         age = time.monotonic() - self._target[1]
         return age > self._timeouts.setpoint * self.slowness
 
     # The reading thread
 
-    def _run(self):
+    def _run(self) -> None:
         delay = self._timeouts.first_retry
         while not self._stopping.is_set():
             connections = self._connections
@@ -243,7 +252,7 @@ class Board:
             self._stopping.wait(delay)
             delay = min(2.0 * delay, self._timeouts.last_retry)
 
-    def _greet(self):
+    def _greet(self) -> None:
         identity = self._link.greet(self._period, self._timeouts.watchdog, self._stopping)
         with self._wake:
             if self._identity is None:
@@ -259,7 +268,7 @@ class Board:
             self._supply = None
             self._connections += 1
 
-    def _listen(self):
+    def _listen(self) -> None:
         """Read telemetry until the board starts anew; raise when it is lost."""
         patience = self._timeouts.telemetry * self.slowness
         while not self._stopping.is_set():
@@ -279,7 +288,7 @@ class Board:
                 raise BoardError(f'port {self._link.port}: the board is silent, no telemetry for '
                                  f'{patience:.3g} s; the output is off')
 
-    def _take(self, telemetry):
+    def _take(self, telemetry: Telemetry) -> None:
         reading = self._encoder.update(self._clock.follow(telemetry.time), telemetry.counts,
                                        telemetry.index, telemetry.latch)
         self._smooth(telemetry.supply)
@@ -296,7 +305,7 @@ class Board:
             self._received = time.monotonic()
         self._on_sample(sample)
 
-    def _smooth(self, supply):
+    def _smooth(self, supply: float) -> None:
         """Average the supply, so that its noise does not move the muscle to and fro."""
         before = self._supply
         if before is None or abs(supply - before) > SUPPLY_JUMP * self._nominal_supply:
@@ -305,7 +314,7 @@ class Board:
             self._supply_samples = min(self._supply_samples + 1, SUPPLY_SAMPLES)
             self._supply += (supply - before) / self._supply_samples
 
-    def _lose(self, problem):
+    def _lose(self, problem: str) -> None:
         with self._wake:
             self._online = False
             self._problem = problem
@@ -315,7 +324,7 @@ class Board:
 
     # The writing thread
 
-    def _write(self):
+    def _write(self) -> None:
         while True:
             with self._wake:
                 self._wake.wait_for(lambda: self._news or self._stopping.is_set(),
@@ -331,7 +340,7 @@ class Board:
             except (BoardError, ProtocolError) as error:
                 self._write_problem = error
 
-    def _command(self):
+    def _command(self) -> tuple[str, Fields | None] | None:
         """Return what the board has to hear now: (kind, fields), or None."""
         if self._wanted != self._sample.enabled:
             return (ENABLE if self._wanted else DISABLE, None)
@@ -339,7 +348,7 @@ class Board:
             return None
         return (SET, {'duty': self._duty()})
 
-    def _duty(self):
+    def _duty(self) -> float:
         self._limit = ''
         if self._target is None or self._expired():
             return 0.0
@@ -353,7 +362,7 @@ class Board:
         self._limit = drive.limit
         return drive.duty
 
-    def _say_zero(self):
+    def _say_zero(self) -> None:
         """Tell the board to stop, as far as it can still hear."""
         try:
             self._link.send(SET, {'duty': 0.0})

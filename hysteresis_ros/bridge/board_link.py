@@ -12,7 +12,7 @@ import time
 import serial
 
 from hysteresis_ros.bridge.messages import BOARD, CONFIG, HELLO, Identity, NO, OK
-from hysteresis_ros.bridge.protocol import Decoder, encode, Frame, SEQUENCE_LIMIT, VERSION
+from hysteresis_ros.bridge.protocol import Decoder, encode, Fields, Frame, SEQUENCE_LIMIT, VERSION
 from hysteresis_ros.errors import BoardError, ParameterError
 
 HANDLERS = 'hysteresis_ros.bridge.urlhandlers'
@@ -102,7 +102,7 @@ class BoardLink:
 
     """
 
-    def __init__(self, port, baud, timeouts):
+    def __init__(self, port: str, baud: int, timeouts: Timeouts) -> None:
         self.port = port
         self.decoder = Decoder()
         self.lost_frames = 0
@@ -127,7 +127,7 @@ class BoardLink:
         except ValueError as error:
             raise ParameterError(f'port {port}: {error}') from None
 
-    def open(self):
+    def open(self) -> None:
         """
         Open the port.
 
@@ -148,7 +148,7 @@ class BoardLink:
         self.decoder.feed(b'\n')
         self._expected = None
 
-    def close(self):
+    def close(self) -> None:
         """Close the port, whatever state it is in."""
         try:
             if self._serial is not None:
@@ -156,7 +156,7 @@ class BoardLink:
         except OSError:
             pass    # a device that is gone cannot be closed any better
 
-    def greet(self, period, watchdog, stopping):
+    def greet(self, period: float, watchdog: float, stopping: threading.Event) -> Identity:
         """
         Find out who is there and tell the board its periods.
 
@@ -190,7 +190,7 @@ class BoardLink:
                   stopping)
         return identity
 
-    def send(self, kind, fields=None):
+    def send(self, kind: str, fields: Fields | None = None) -> int:
         """
         Send one frame.
 
@@ -218,7 +218,7 @@ class BoardLink:
             self._write(encode(kind, sequence, fields))
         return sequence
 
-    def read(self):
+    def read(self) -> list[Frame]:
         """
         Wait a moment for frames.
 
@@ -246,11 +246,11 @@ class BoardLink:
             self._expected = (frame.sequence + 1) % SEQUENCE_LIMIT
         return frames
 
-    def _make(self):
+    def _make(self) -> None:
         if self._serial is None:
             self._serial = serial.serial_for_url(self.port, do_not_open=True, **self._settings)
 
-    def _ask(self, kind, fields, stopping):
+    def _ask(self, kind: str, fields: Fields | None, stopping: threading.Event) -> Frame:
         asked = set()
         now = time.monotonic()
         give_up = now + self._timeouts.greeting
@@ -270,7 +270,7 @@ class BoardLink:
             now = time.monotonic()
         raise BoardError(self._no_answer(kind))
 
-    def _no_answer(self, kind):
+    def _no_answer(self, kind: str) -> str:
         within = f'within {self._timeouts.greeting:g} s'
         if self.decoder.last_bad is not None and self._bytes:
             return (f'port {self.port}: no answer to {kind!r} {within}, but {self._bytes} bytes '
@@ -280,7 +280,7 @@ class BoardLink:
             return f'port {self.port}: no answer to {kind!r} {within}; is the board listening?'
         return f'port {self.port}: silent, no answer to {kind!r} {within}; is the board on?'
 
-    def _write(self, data):
+    def _write(self, data: bytes) -> None:
         if self._serial is None:
             raise BoardError(f'port {self.port} is not open')
         try:

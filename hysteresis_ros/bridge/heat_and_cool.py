@@ -55,7 +55,7 @@ class HeatAndCool:
 
     """
 
-    def __init__(self, voltage, heat_time, cool_time):
+    def __init__(self, voltage: float, heat_time: float, cool_time: float) -> None:
         if not (voltage > 0.0 and heat_time > 0.0 and cool_time > 0.0):
             raise ParameterError('heat and cool cycle: voltage and both times have to be positive')
         self._voltage = voltage
@@ -66,7 +66,7 @@ class HeatAndCool:
         self._last = None
         self._still_since = None    # (time, angle)
 
-    def update(self, time, angle, applied):
+    def update(self, time: float, angle: float, applied: float) -> Phase:
         """
         Take one sample of telemetry.
 

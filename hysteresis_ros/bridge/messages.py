@@ -10,7 +10,7 @@ each; here they are read and written.
 
 from typing import NamedTuple
 
-from hysteresis_ros.bridge.protocol import decimal, integer, write_number
+from hysteresis_ros.bridge.protocol import decimal, Frame, integer, write_number
 from hysteresis_ros.errors import ProtocolError
 
 HELLO = 'hello'
@@ -65,7 +65,7 @@ class Identity(NamedTuple):
     counter_bits: int
     speed: float
 
-    def fields(self):
+    def fields(self) -> dict[str, str | int | float]:
         """
         Return the fields of the frame.
 
@@ -79,7 +79,7 @@ class Identity(NamedTuple):
         return fields
 
     @classmethod
-    def from_frame(cls, frame):
+    def from_frame(cls, frame: Frame) -> 'Identity':
         """
         Read a ``board`` frame.
 
@@ -150,7 +150,7 @@ class Telemetry(NamedTuple):
     ambient: 'float | None' = None
     accepted: 'int | None' = None
 
-    def fields(self):
+    def fields(self) -> dict[str, str | int | float]:
         """
         Return the fields of the frame.
 
@@ -171,7 +171,7 @@ class Telemetry(NamedTuple):
         return fields
 
     @classmethod
-    def from_frame(cls, frame):
+    def from_frame(cls, frame: Frame) -> 'Telemetry':
         """
         Read a ``tele`` frame.
 

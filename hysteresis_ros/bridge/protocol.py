@@ -13,13 +13,19 @@ hexadecimal digits. A line that begins with ``#`` is a remark for people and car
 Everything else is a bad line: counted, never acted on. `docs/protocol.md` is the whole page.
 """
 
+from __future__ import annotations
+
 import binascii
+from collections.abc import Callable
 import math
 import numbers
 import re
-from typing import Mapping, NamedTuple, Union
+from typing import Mapping, NamedTuple, TYPE_CHECKING, Union
 
 from hysteresis_ros.errors import ProtocolError
+
+if TYPE_CHECKING:
+    from hysteresis_ros.bridge.protocol import Fields
 
 VERSION = 1
 MAX_LINE = 192
@@ -83,7 +89,7 @@ class BadLine(NamedTuple):
 Line = Union[Frame, Remark, BadLine]
 
 
-def crc16(data):
+def crc16(data: bytes) -> int:
     """
     CRC-16/CCITT-FALSE of some bytes.
 
@@ -101,7 +107,7 @@ def crc16(data):
     return binascii.crc_hqx(data, 0xFFFF)
 
 
-def encode(kind, sequence, fields=None):
+def encode(kind: str, sequence: int, fields: Fields | None = None) -> bytes:
     """
     Write a frame as the bytes that go over the wire.
 
@@ -144,7 +150,7 @@ def encode(kind, sequence, fields=None):
     return line
 
 
-def write_number(value, decimals=5):
+def write_number(value: float, decimals: int = 5) -> str:
     """
     Write a number so that a microcontroller without printf or scanf can read it.
 
@@ -174,7 +180,7 @@ def write_number(value, decimals=5):
     return text
 
 
-def integer(frame, key, default=None):
+def integer(frame: Frame, key: str, default: int | None = None) -> int:
     """
     Read a whole number from a frame.
 
@@ -200,7 +206,7 @@ def integer(frame, key, default=None):
     return _number(frame, key, default, _INTEGER, int, 'a whole number')
 
 
-def decimal(frame, key, default=None):
+def decimal(frame: Frame, key: str, default: float | None = None) -> float:
     """
     Read a decimal number from a frame.
 
@@ -227,7 +233,8 @@ def decimal(frame, key, default=None):
     return _number(frame, key, default, _DECIMAL, float, 'a decimal number')
 
 
-def _number(frame, key, default, form, convert, wanted):
+def _number(frame: Frame, key: str, default: Number | None, form: re.Pattern[str],
+            convert: Callable[[str], Number], wanted: str) -> Number:
     text = frame.fields.get(key)
     if text is None:
         if default is None:
@@ -238,7 +245,7 @@ def _number(frame, key, default, form, convert, wanted):
     return convert(text)
 
 
-def parse_line(line):
+def parse_line(line: bytes) -> Line | None:
     """
     Read one line, without its newline.
 
@@ -276,7 +283,7 @@ def parse_line(line):
     return Frame(kind.decode('ascii'), int(sequence), fields)
 
 
-def _printable(data, length=60):
+def _printable(data: bytes, length: int = 60) -> str:
     text = data[:length].decode('ascii', 'backslashreplace')
     return ''.join(c if c.isprintable() else f'\\x{ord(c):02x}' for c in text)[:length]
 
@@ -297,14 +304,14 @@ class Decoder:
 
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.frames = 0
         self.remarks = 0
         self.bad_lines = 0
         self.last_bad = None
         self._line = bytearray()
 
-    def feed(self, data):
+    def feed(self, data: bytes) -> list[Line]:
         """
         Take bytes as they come from the port.
 
@@ -329,10 +336,10 @@ class Decoder:
         self._append(tail)
         return found
 
-    def _append(self, piece):
+    def _append(self, piece: bytes) -> None:
         self._line += piece[:MAX_LINE - len(self._line)]
 
-    def _take(self):
+    def _take(self) -> bytes:
         if len(self._line) >= MAX_LINE:
             line = BadLine(f'longer than {MAX_LINE} bytes', _printable(bytes(self._line)), '')
         else:

@@ -2,14 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis diagnose`: which physical effect the model is missing."""
 
+from __future__ import annotations
+
+import argparse
+
+from typing import TYPE_CHECKING
+
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, write_json)
+    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, Subparsers,
+    write_json)
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.verdict import Diagnosis
 
 UNITS = {'angle': (57.29577951308232, 'deg'), 'length': (1e3, 'mm'), 'strain': (100.0, '%'),
          'force': (1.0, 'N')}
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'diagnose', help='which physical effect is missing',
@@ -28,7 +38,7 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.api import diagnose, load_model
 
@@ -44,7 +54,7 @@ def run(args):
         write_diagnosis(args.report, model, measurements, found, args.model)
 
 
-def to_text(found, response):
+def to_text(found: Diagnosis, response: str) -> str:
     """Return the diagnosis for a terminal."""
     from hysteresis_ros.comparison.compare import layout
     from hysteresis_ros.report.words import parameters_in_words, verdict_in_words

@@ -2,15 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis identify`: from bench tables to a model."""
 
+from __future__ import annotations
+
+import argparse
+
+from typing import TYPE_CHECKING
+
 from hysteresis_ros.cli.common import (
-    add_json, numbers, progress, say, Steps, write_json)
+    add_json, numbers, progress, say, Steps, Subparsers, write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.errors import ParameterError
+
+if TYPE_CHECKING:
+    from hysteresis_ros.identification.bench import Identified
 
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'identify', help='fit a model to bench tables',
@@ -40,7 +49,7 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.api import identify
 
@@ -61,7 +70,7 @@ def run(args):
         write_json(args.json, {'model': args.output, **found.to_dict()})
 
 
-def report(found):
+def report(found: Identified) -> str:
     """Return the rows of Table I and what the fits say, for a terminal."""
     from hysteresis_ros.comparison.compare import layout
     from hysteresis_ros.report.words import parameters_in_words

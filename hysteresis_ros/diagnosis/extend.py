@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Add effects to a model, fit them, and show the error before and after on data not fitted."""
 
+from __future__ import annotations
+
 import dataclasses
 import hashlib
 from typing import TYPE_CHECKING
@@ -17,6 +19,7 @@ from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements.quantities import shown
+from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.result import Brief, Result
 
 if TYPE_CHECKING:
@@ -47,7 +50,7 @@ class Extension(Result):
         What was measured: 'angle', 'length' or 'strain'.
     """
 
-    model: object
+    model: MuscleModel
     added: list
     train: dict
     test: dict
@@ -78,7 +81,7 @@ class Extension(Result):
                 for name, entry in effect.to_dict()['parameters'].items()]
         return Brief(lines, ['effect', 'parameter', 'value', 'low', 'high', 'unit'], rows)
 
-    def plot(self) -> 'Figure':
+    def plot(self) -> Figure:
         """
         Draw how the error falls with every effect that was added.
 

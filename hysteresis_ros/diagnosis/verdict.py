@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The answer of a diagnosis, and what both kinds of measurement say in the same words."""
 
+from __future__ import annotations
+
 import dataclasses
 from typing import TYPE_CHECKING
 
@@ -119,7 +121,7 @@ class Diagnosis(Result):
         return Brief(lines, ['effect', f'RMSE after [{unit or "1"}]', 'gain', 'p', 'plausible'],
                      rows)
 
-    def plot(self) -> 'Figure':
+    def plot(self) -> Figure:
         """
         Draw the error with each effect added alone, with 95 % intervals.
 
@@ -130,7 +132,6 @@ class Diagnosis(Result):
         """
         from hysteresis_ros.report.plots import ranking
         return ranking(self)
-
 
 
 def ranking_row(effect, fit, before: float, after: float, p_value: float, gain: tuple) -> dict:

@@ -55,139 +55,167 @@ class Effect:
     listed: bool = True
 
 
-def _supply_sag(conditions, size, specimen, recording):
+def _supply_sag(conditions: Conditions, size: float, specimen: np.random.Generator,
+                recording: np.random.Generator) -> None:
     conditions.lead_resistance = 0.9 * size
 
 
-def _pwm_dead_zone(conditions, size, specimen, recording):
+def _pwm_dead_zone(conditions: Conditions, size: float, specimen: np.random.Generator,
+                   recording: np.random.Generator) -> None:
     conditions.dead_voltage = 1.0 * size
 
 
-def _resistance_change(conditions, size, specimen, recording):
+def _resistance_change(conditions: Conditions, size: float, specimen: np.random.Generator,
+                       recording: np.random.Generator) -> None:
     conditions.resistance_growth = 0.17 * size
 
 
-def _thermal_lag(conditions, size, specimen, recording):
+def _thermal_lag(conditions: Conditions, size: float, specimen: np.random.Generator,
+                 recording: np.random.Generator) -> None:
     conditions.heat.time_constant = max(conditions.heat.time_constant, 6.0 * size)
 
 
-def _heating_cooling_asymmetry(conditions, size, specimen, recording):
+def _heating_cooling_asymmetry(conditions: Conditions, size: float, specimen: np.random.Generator,
+                               recording: np.random.Generator) -> None:
     conditions.heat.time_constant = max(conditions.heat.time_constant, 3.0)
     conditions.heat.heating_ratio = 2.0 ** (0.87 * size)
 
 
-def _latent_heat(conditions, size, specimen, recording):
+def _latent_heat(conditions: Conditions, size: float, specimen: np.random.Generator,
+                 recording: np.random.Generator) -> None:
     conditions.heat.time_constant = max(conditions.heat.time_constant, 2.0)
     conditions.heat.latent = ENTHALPY / SPECIFIC_HEAT * size
 
 
-def _ambient_temperature(conditions, size, specimen, recording):
+def _ambient_temperature(conditions: Conditions, size: float, specimen: np.random.Generator,
+                         recording: np.random.Generator) -> None:
     conditions.air.swing = 12.0 * size
     conditions.air.period = 0.45 * conditions.recording_time
     conditions.air.phase = recording.uniform(0.0, 2.0 * math.pi)
 
 
-def _ambient_drift(conditions, size, specimen, recording):
+def _ambient_drift(conditions: Conditions, size: float, specimen: np.random.Generator,
+                   recording: np.random.Generator) -> None:
     conditions.air.warming = 15.0 * size
     conditions.air.warming_time = 0.6 * conditions.recording_time
 
 
-def _airflow(conditions, size, specimen, recording):
+def _airflow(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     factor = 1.0 + 0.35 * abs(size)
     conditions.heat.airflow *= factor if size > 0.0 else 1.0 / factor
 
 
-def _change_material(conditions, **values):
+def _change_material(conditions: Conditions, **values: float) -> None:
     conditions.material = dataclasses.replace(conditions.material, **values)
 
 
-def _stress_dependence(conditions, size, specimen, recording):
+def _stress_dependence(conditions: Conditions, size: float, specimen: np.random.Generator,
+                       recording: np.random.Generator) -> None:
     factor = 1.0 + 0.35 * abs(size)
     _change_material(conditions, clausius_clapeyron=conditions.material.clausius_clapeyron
                      * (1.0 / factor if size > 0.0 else factor))
 
 
-def _stress_dependent_strain(conditions, size, specimen, recording):
+def _stress_dependent_strain(conditions: Conditions, size: float, specimen: np.random.Generator,
+                             recording: np.random.Generator) -> None:
     material = conditions.material
     growth = material.largest_strain - material.strain_without_load
     _change_material(
         conditions, largest_strain=material.strain_without_load + growth * (1.0 + 0.5 * size))
 
 
-def _r_phase(conditions, size, specimen, recording):
+def _r_phase(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     _change_material(conditions, early_strain=0.0085 * size)
 
 
-def _creep(conditions, size, specimen, recording):
+def _creep(conditions: Conditions, size: float, specimen: np.random.Generator,
+           recording: np.random.Generator) -> None:
     conditions.creep = 0.004 * size
 
 
-def _fatigue(conditions, size, specimen, recording):
+def _fatigue(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     conditions.shrinkage = 0.0025 * size
     conditions.tiring = 0.02 * size
 
 
-def _slack(conditions, size, specimen, recording):
+def _slack(conditions: Conditions, size: float, specimen: np.random.Generator,
+           recording: np.random.Generator) -> None:
     conditions.dead_length = 0.0035 * size
 
 
-def _series_compliance(conditions, size, specimen, recording):
+def _series_compliance(conditions: Conditions, size: float, specimen: np.random.Generator,
+                       recording: np.random.Generator) -> None:
     conditions.compliance = size / 2500.0
 
 
-def _unequal_muscles(conditions, size, specimen, recording):
+def _unequal_muscles(conditions: Conditions, size: float, specimen: np.random.Generator,
+                     recording: np.random.Generator) -> None:
     conditions.wire_offsets = (-0.004 * size, 0.0, 0.004 * size)
 
 
-def _coulomb_friction(conditions, size, specimen, recording):
+def _coulomb_friction(conditions: Conditions, size: float, specimen: np.random.Generator,
+                      recording: np.random.Generator) -> None:
     conditions.coulomb = 0.08 * size
 
 
-def _viscous_friction(conditions, size, specimen, recording):
+def _viscous_friction(conditions: Conditions, size: float, specimen: np.random.Generator,
+                      recording: np.random.Generator) -> None:
     conditions.viscous = 2.5 * size
 
 
-def _inertia(conditions, size, specimen, recording):
+def _inertia(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     conditions.inertia = 0.03 * size
 
 
-def _change_linkage(conditions, **values):
+def _change_linkage(conditions: Conditions, **values: float) -> None:
     conditions.linkage = dataclasses.replace(conditions.linkage, **values)
 
 
-def _payload_error(conditions, size, specimen, recording):
+def _payload_error(conditions: Conditions, size: float, specimen: np.random.Generator,
+                   recording: np.random.Generator) -> None:
     _change_linkage(conditions, payload_mass=conditions.linkage.payload_mass + 0.050 * size)
 
 
-def _clamp_mass(conditions, size, specimen, recording):
+def _clamp_mass(conditions: Conditions, size: float, specimen: np.random.Generator,
+                recording: np.random.Generator) -> None:
     _change_linkage(conditions, clamp_mass=0.026 * size, clamp_radius=0.05, clamp_phase=0.3)
 
 
-def _geometry_error(conditions, size, specimen, recording):
+def _geometry_error(conditions: Conditions, size: float, specimen: np.random.Generator,
+                    recording: np.random.Generator) -> None:
     linkage = conditions.linkage
     _change_linkage(conditions, clamp_distance=linkage.clamp_distance + 0.0025 * size,
                     anchor_height=linkage.anchor_height + 0.0015 * size)
 
 
-def _frame_tilt(conditions, size, specimen, recording):
+def _frame_tilt(conditions: Conditions, size: float, specimen: np.random.Generator,
+                recording: np.random.Generator) -> None:
     _change_linkage(conditions, tilt=math.radians(18.0) * size)
 
 
-def _end_stop(conditions, size, specimen, recording):
+def _end_stop(conditions: Conditions, size: float, specimen: np.random.Generator,
+              recording: np.random.Generator) -> None:
     cut = 0.25 * abs(size) * (LOWERED - RAISED)
     conditions.stop_side = 1 if size > 0.0 else -1
     conditions.stop = math.radians(LOWERED - cut if size > 0.0 else RAISED + cut)
 
 
-def _encoder_offset(conditions, size, specimen, recording):
+def _encoder_offset(conditions: Conditions, size: float, specimen: np.random.Generator,
+                    recording: np.random.Generator) -> None:
     conditions.encoder_offset = math.radians(9.0) * size
 
 
-def _backlash(conditions, size, specimen, recording):
+def _backlash(conditions: Conditions, size: float, specimen: np.random.Generator,
+              recording: np.random.Generator) -> None:
     conditions.backlash = math.radians(8.0) * size
 
 
-def _latency(conditions, size, specimen, recording):
+def _latency(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     conditions.latency = 2.0 * size
 
 
@@ -238,8 +266,9 @@ LISTED = {
 }
 
 
-def _disturb(kind):
-    def apply(conditions, size, specimen, recording):
+def _disturb(kind: type[Unlisted]) -> Apply:
+    def apply(conditions: Conditions, size: float, specimen: np.random.Generator,
+              recording: np.random.Generator) -> None:
         conditions.disturbances.append(kind(size, conditions, specimen, recording))
     return apply
 

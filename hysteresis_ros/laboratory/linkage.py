@@ -67,7 +67,7 @@ class Linkage:
     clamp_phase: float = 0.0
     tilt: float = 0.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         radius = math.hypot(self.clamp_distance, self.clamp_height)
         set_once = object.__setattr__
         set_once(self, '_lead', math.atan2(self.clamp_height, self.clamp_distance))

@@ -129,7 +129,7 @@ class Wire:
         Of crimps and cable in series with the wire [m/N].
     """
 
-    def __init__(self, material: WireMaterial):
+    def __init__(self, material: WireMaterial) -> None:
         self.material = material
         self.retained = 0.0
         self.excess = 0.0

@@ -58,7 +58,7 @@ class SimulatedPort:
 
     """
 
-    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic):
+    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         simulation = parse_url(url)
         board = SimulatedBoard(make_plant(simulation).arm, supply=simulation.supply,
                                seed=simulation.seed, speed=simulation.speed,
