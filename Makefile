@@ -6,6 +6,7 @@
 PYTHON ?= python3
 CONSTRAINTS ?=
 DEMO_ARGS ?=
+BENCHMARK_ARGS ?=
 HIDDEN_ARGS ?=
 PYTEST_ARGS ?=
 
@@ -48,7 +49,7 @@ COLCON := $(VENV)/bin/python -c 'import sys; from colcon_core.command import mai
 IN_WORKSPACE := export PATH="$$PWD/$(VENV)/bin:$$PATH"; \
 	$(if $(filter sourced,$(ROS)),,export AMENT_PREFIX_PATH="$$PWD/$(VENV)";) \
 	. ./$(WORKSPACE)/install/local_setup.sh; \
-	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)"
 
 .PHONY: help build demo test benchmark hidden docs clean force
 
@@ -61,7 +62,7 @@ help:
 	@echo 'make build      the workspace alone; then: . install/local_setup.sh'
 	@echo 'make clean      remove all that make made'
 	@echo 'PYTHON= chooses the interpreter, CONSTRAINTS= a pip constraints file,'
-	@echo 'DEMO_ARGS=, PYTEST_ARGS=, HIDDEN_ARGS= are passed on.'
+	@echo 'DEMO_ARGS=, PYTEST_ARGS=, HIDDEN_ARGS= are passed on, BENCHMARK_ARGS= such as --quick.'
 
 # An environment holds absolute paths, so a moved checkout needs a new one, as another Python does.
 IDENTITY := $(CURDIR) $(PYTHON) $(EXTRAS) $(CONSTRAINTS)
@@ -95,7 +96,7 @@ test: build
 		--cov --cov-report=term $(PYTEST_ARGS)
 
 benchmark: build
-	@$(IN_WORKSPACE) $(VENV)/bin/python -m benchmark benchmark.json
+	@$(IN_WORKSPACE) $(VENV)/bin/python -m benchmark $(BENCHMARK_ARGS) benchmark.json
 
 hidden: build
 	@$(IN_WORKSPACE) $(VENV)/bin/python tools/hidden.py --page docs/results.md $(HIDDEN_ARGS) hidden.json

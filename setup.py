@@ -78,10 +78,12 @@ setup(
     install_requires=[
         'numpy>=1.26',
         'scipy>=1.11',
+        'numba>=0.59',
         'matplotlib>=3.6',
         'pyserial>=3.5',
         'PyYAML>=6.0.1',
         'joblib>=1.3',
+        'threadpoolctl>=3.1',
         'tqdm>=4.64',
     ],
     extras_require={

@@ -1,12 +1,14 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Run every benchmark and write one flat mapping: `python -m benchmark benchmark.json`.
+Run every benchmark and write one flat mapping: `python -m benchmark [--quick] benchmark.json`.
 
 A benchmark is a function of a module in this folder whose name ends in ``_benchmarks``. It takes
-nothing and returns a mapping from a name, with its unit as suffix, to a number.
+whether few repetitions will do, and returns a mapping from a name, with its unit as suffix, to a
+number.
 """
 
+import argparse
 from importlib import import_module
 import json
 import math
@@ -24,9 +26,9 @@ def discover():
     for module in sorted(info.name for info in pkgutil.iter_modules(benchmark.__path__)):
         if module == '__main__':
             continue
-        contents = vars(import_module(f'benchmark.{module}'))
-        functions += [function for name, function in contents.items()
-                      if name.endswith('_benchmarks') and callable(function)]
+        home = f'benchmark.{module}'
+        functions += [function for name, function in vars(import_module(home)).items()
+                      if name.endswith('_benchmarks') and function.__module__ == home]
     return functions
 
 
@@ -54,7 +56,7 @@ def merge(results, new):
         results[name] = round(float(value), 9)
 
 
-def main(path):
+def main(path, quick=False):
     """
     Run all benchmarks, print them as they come, and write them to a file.
 
@@ -62,6 +64,8 @@ def main(path):
     ----------
     path : str
         JSON file to write.
+    quick : bool
+        Few repetitions, and without what takes long: to see that all of it runs.
 
     Returns
     -------
@@ -74,7 +78,7 @@ def main(path):
         if not functions:
             raise HysteresisError('no function named *_benchmarks in the folder benchmark')
         for function in functions:
-            new = function()
+            new = function(quick)
             merge(results, new)
             for name in new:
                 print(f'{name:55s} {results[name]:.6g}', flush=True)
@@ -87,4 +91,9 @@ def main(path):
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv[1]))
+    parser = argparse.ArgumentParser(prog='python -m benchmark', description='Measure it all.')
+    parser.add_argument('--quick', action='store_true',
+                        help='few repetitions, and without what takes long')
+    parser.add_argument('path', nargs='?', default='benchmark.json', help='JSON file to write')
+    args = parser.parse_args()
+    sys.exit(main(args.path, args.quick))

@@ -19,12 +19,12 @@ from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.operators import cell_areas, signed_areas
 from hysteresis_ros.table1 import FORCE_TRIALS, LENGTH_TRIALS
 
-SEEDS = range(3)
-REPEATS = 5
+SEEDS, QUICK_SEEDS = range(3), range(1)
+REPEATS, QUICK_REPEATS = 5, 1
 TABLES = {'force': 'F', 'length': 'L'}
 
 
-def identification_benchmarks():
+def identification_benchmarks(quick: bool) -> dict:
     """
     Measure time and errors of the identification.
 
@@ -35,10 +35,10 @@ def identification_benchmarks():
         ``identify_bench_s`` all of `identify` on both tables; errors are mean |e| in percent of
         the range, averaged over specimens, and ratios to the paper's recipe.
     """
-    results = {'identify_148x211_s': problem_time()}
+    results = {'identify_148x211_s': problem_time(QUICK_REPEATS if quick else REPEATS)}
     found = {'ours': {}, 'recipe': {}, 'linear': {}}
     times = []
-    for seed in SEEDS:
+    for seed in QUICK_SEEDS if quick else SEEDS:
         tables = bench_tables({}, seed)
         length = Measurement.from_columns(tables['length.csv'])
         force = Measurement.from_columns(tables['force.csv'])
@@ -63,7 +63,7 @@ def identification_benchmarks():
     return results
 
 
-def problem_time():
+def problem_time(repeats: int) -> float:
     """Return the median time of the problem with 148 rows and 211 unknowns [s]."""
     tables = bench_tables({}, 0)['length.csv']
     chosen = np.isin(tables['trial'], LENGTH_TRIALS)
@@ -72,7 +72,7 @@ def problem_time():
     nodes = np.linspace(inputs.min(), inputs.max(), 21)
     rows = np.concatenate([signed_areas(nodes, inputs[groups == k]) for k in range(len(LOADS))])
     times = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         start = time.perf_counter()
         fit_weights(rows, tables['length'][chosen], groups=groups, scale=cell_areas(nodes),
                     penalty=smoothness(nodes), slack=SLACK)

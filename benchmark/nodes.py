@@ -23,9 +23,10 @@ from hysteresis_ros.errors import HysteresisError
 from hysteresis_ros.nodes.qos import COMMANDS
 
 ANGLES = 1.7, 2.4           # rad, within reach of the bicep
-BLOCKS = 300
+BLOCKS, QUICK_BLOCKS = 300, 3
 BLOCK = 10                  # messages of one chain before the next has its turn
-RATE, SECONDS = 500, 60.0   # targets a second, and for how long
+RATE = 500                  # targets a second, and for how long [s]
+SECONDS, QUICK_SECONDS = 60.0, 0.5
 PATIENCE = 20.0             # s for a chain to come up, or for a message to come through
 
 NODE = 'import sys; from hysteresis_ros.nodes.{}_node import main; sys.exit(main())'
@@ -40,7 +41,7 @@ CHAINS = {
 }
 
 
-def node_benchmarks() -> dict:
+def node_benchmarks(quick: bool) -> dict:
     """
     Measure latency and throughput of `geometry_node` and `compensator_node`.
 
@@ -62,8 +63,8 @@ def node_benchmarks() -> dict:
         rclpy.init(args=[], context=context, domain_id=domain)
         stack.callback(rclpy.shutdown, context=context)
         probe = stack.enter_context(Probe(context))
-        latencies = probe.latencies()
-        lost = probe.lost('nodes', RATE, SECONDS)
+        latencies = probe.latencies(QUICK_BLOCKS if quick else BLOCKS)
+        lost = probe.lost('nodes', RATE, QUICK_SECONDS if quick else SECONDS)
     median, late = ({name: float(np.percentile(values, percent))
                      for name, values in latencies.items()} for percent in (50, 99))
     results = {'node_chain_latency_median_ms': 1e3 * median['nodes'],
@@ -108,10 +109,10 @@ class Probe:
         self._executor.shutdown()
         self._node.destroy_node()
 
-    def latencies(self) -> dict:
+    def latencies(self, blocks: int) -> dict:
         """Return the times from target to setpoint [s] of each chain, shape (messages,)."""
         found = {name: [] for name in CHAINS}
-        for _ in range(BLOCKS):
+        for _ in range(blocks):
             for name in CHAINS:
                 found[name] += [self._latency(name) for _ in range(BLOCK)]
         return {name: np.array(values) for name, values in found.items()}

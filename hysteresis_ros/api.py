@@ -170,7 +170,7 @@ def identify(length: Source | None = None, force: Source | None = None, *,
     """
     from hysteresis_ros.identification import bench
 
-    tables = {name: None if source is None else _bench_table(source, name)
+    tables = {name: None if source is None else bench_table(source, name)
               for name, source in (('length', length), ('force', force))}
     names = _names(effects)
     if names != [] and tables['length'] is None:
@@ -336,6 +336,36 @@ def predict(model: Model, data: Sources, *,
     return found if _several(data) else found[0]
 
 
+def bench_table(source: Source, argument: str) -> Measurement:
+    """
+    Return a bench table and check that it is of the kind that its argument asks for.
+
+    Parameters
+    ----------
+    source : path, Measurement or mapping
+    argument : {'force', 'length'}
+
+    Returns
+    -------
+    Measurement
+
+    Raises
+    ------
+    MeasurementError
+        If it cannot be read or is of another kind.
+
+    """
+    measurement, responses = _measurement(source), BENCH_RESPONSES[argument]
+    if measurement.response not in responses:
+        swapped = any(measurement.response in names for names in BENCH_RESPONSES.values())
+        raise MeasurementError(
+            f'{measurement.source}: the table measures {measurement.response}, but '
+            f'{" or ".join(responses)} is needed here; '
+            + ('are the force and the length table swapped?' if swapped
+               else 'identify takes bench tables'))
+    return measurement
+
+
 def _several(data: Sources) -> bool:
     """Tell a collection of measurements from one."""
     return not (isinstance(data, (str, os.PathLike)) or hasattr(data, 'items')
@@ -367,19 +397,6 @@ def _measurement(source: Source) -> Measurement:
         return Measurement.from_columns(source)
     raise ParameterError(f'a measurement cannot be a {type(source).__name__}; give a path, a '
                          'Measurement or a table of columns')
-
-
-def _bench_table(source: Source, argument: str) -> Measurement:
-    """Return a bench table and check that it is of the kind that its argument asks for."""
-    measurement, responses = _measurement(source), BENCH_RESPONSES[argument]
-    if measurement.response not in responses:
-        swapped = any(measurement.response in names for names in BENCH_RESPONSES.values())
-        raise MeasurementError(
-            f'{measurement.source}: the table measures {measurement.response}, but '
-            f'{" or ".join(responses)} is needed here; '
-            + ('are the force and the length table swapped?' if swapped
-               else 'identify takes bench tables'))
-    return measurement
 
 
 def _model(model: Model) -> MuscleModel:

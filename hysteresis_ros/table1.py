@@ -27,6 +27,7 @@ from hysteresis_ros.laboratory.experiments import LOADS, bench_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import Plant
 from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.workers import one_blas_thread
 
 if TYPE_CHECKING:
     from hysteresis_ros.model import Controller, MuscleModel
@@ -50,6 +51,7 @@ ONE_LOAD = LOADS.index(3.136)
 Drives = Callable[[np.ndarray], np.ndarray]
 
 
+@one_blas_thread()
 def table1(seeds: Iterable[int], effects: Sequence[str] | None = (), jobs: int = 1) -> dict:
     """
     Carry the experiment out on several specimens.

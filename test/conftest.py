@@ -14,12 +14,22 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
+# Whole diagnoses and whole sessions, by file: marked as slow, as single tests may be, too.
+SLOW = ('test_bench_diagnosis', 'test_demo', 'test_diagnose', 'test_readme', 'test_table1')
+
 # Tests of other runs on the same network must not be heard; rclpy reads this at its start.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
 # Slow machines are no failures, and every run tries the same examples.
 hypothesis.settings.register_profile('suite', deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile('suite')
+
+
+def pytest_collection_modifyitems(items):
+    """Mark what `-m "not slow"` leaves out."""
+    for item in items:
+        if item.path.stem in SLOW:
+            item.add_marker('slow')
 
 
 @pytest.fixture(scope='session')

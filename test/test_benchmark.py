@@ -1,9 +1,11 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How benchmarks are found and joined; what they measure is not asked here."""
+"""How benchmarks are found and joined, and that all of them run; not what they measure."""
 
 import json
 import math
+import subprocess
+import sys
 
 from benchmark.__main__ import discover, main, merge
 import pytest
@@ -39,9 +41,28 @@ def test_every_module_offers_a_benchmark():
     assert all(function.__name__.endswith('_benchmarks') for function in functions)
 
 
+@pytest.mark.slow
+def test_every_benchmark_runs(root, tmp_path):
+    """The quick form measures the same names, but for those of the long diagnoses."""
+    pytest.importorskip('rclpy')
+    path = tmp_path / 'benchmark.json'
+    done = subprocess.run([sys.executable, '-m', 'benchmark', '--quick', str(path)], cwd=root,
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    content = json.loads(path.read_text(encoding='utf-8'))
+    assert all(isinstance(value, (int, float)) and math.isfinite(value)
+               for value in content.values())
+    for name in ('arm_settled_row_over_reference_ratio', 'arm_inertia_row_over_reference_ratio',
+                 'two_stage_forward_batch_over_dense_grid_ratio', 'controller_setpoint_us',
+                 'controller_setpoint_p99_over_median_ratio', 'compensator_node_warm_start_s',
+                 'compare_240_rows_command_warm_start_s', 'identify_bench_s',
+                 'node_chain_latency_median_ms'):
+        assert content[name] > 0.0, name
+
+
 def test_the_file_holds_one_flat_mapping(monkeypatch, tmp_path, capsys):
     """Names to numbers, and the same on the terminal."""
-    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda: {'a_us': 2, 'b': 0.5}])
+    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda _: {'a_us': 2, 'b': 0.5}])
     assert main(str(tmp_path / 'benchmark.json')) == 0
     content = json.loads((tmp_path / 'benchmark.json').read_text(encoding='utf-8'))
     assert content == {'a_us': 2.0, 'b': 0.5}
@@ -50,7 +71,7 @@ def test_the_file_holds_one_flat_mapping(monkeypatch, tmp_path, capsys):
 
 def test_a_failing_benchmark_is_told_in_one_line(monkeypatch, tmp_path, capsys):
     """No file is written, and the exit status says so."""
-    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda: {'a': math.nan}])
+    monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda _: {'a': math.nan}])
     assert main(str(tmp_path / 'benchmark.json')) == 1
     assert not (tmp_path / 'benchmark.json').exists()
     assert capsys.readouterr().err.count('\n') == 1

@@ -9,14 +9,21 @@ from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.special import hyp2f1, psi
 
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.kernels import bouc_wen as kernel
 from hysteresis_ros.operators import BoucWen, operator_from_dict
 
 
-def example(stiffness=0.3, gain=2.0, rate=1.2, shape=0.8, exponent=1.7):
+def example(stiffness=0.3, gain=2.0, rate=1.2, shape=0.8, exponent=1.7, **more):
     """Return an operator over -2 to 3."""
-    return BoucWen(stiffness, gain, rate, shape, exponent, 0.4, -2.0, 3.0)
+    return BoucWen(stiffness, gain, rate, shape, exponent, 0.4, -2.0, 3.0, **more)
+
+
+# Dead zones that steepen and then flatten; and a gain almost as negative as it may be.
+BENT = {'thresholds': [0.0, 1.0], 'bends': [1.5, -2.3]}
+LAGGING = {'stiffness': 1.0, 'gain': -0.45, 'rate': 1.3, 'shape': 0.8, 'exponent': 1.7}
 
 
 @pytest.mark.parametrize('shape', [0.5, 0.8, 2.5])
@@ -54,11 +61,14 @@ def test_sampling_of_a_ramp_makes_no_difference(exponent):
         assert once.step(end) == pytest.approx(often.step(end), abs=1e-11)
 
 
-@settings(deadline=None, max_examples=50, derandomize=True)
+@settings(deadline=None, max_examples=80, derandomize=True)
 @given(st.lists(st.floats(-2.5, 3.5), max_size=8), st.floats(0.0, 1.0),
-       st.sampled_from([1.0, -1.0]), st.sampled_from([1.0, 1.7, 3.0]))
-def test_inverse_gives_the_reference_that_can_be_reached(inputs, share, sign, exponent):
-    operator = example(sign * 0.3, sign * 2.0, exponent=exponent)
+       st.sampled_from([1.0, -1.0]), st.sampled_from([1.0, 1.7, 3.0]),
+       st.sampled_from([(0.3, 2.0), (1.0, -0.5), (1.0, -0.3)]), st.sampled_from([{}, BENT]))
+def test_inverse_gives_the_reference_that_can_be_reached(
+        inputs, share, sign, exponent, line, curve):
+    stiffness, gain = line
+    operator = example(sign * stiffness, sign * gain, 1.25, exponent=exponent, **curve)
     for u in inputs:
         operator.step(u)
     low, high = sorted((operator.peek(-2.0), operator.peek(3.0)))
@@ -71,26 +81,6 @@ def test_inverse_gives_the_reference_that_can_be_reached(inputs, share, sign, ex
     for beyond, end in ((high + 0.1, high), (low - 0.1, low)):
         found = operator.invert(beyond)
         assert found.saturated and found.output == pytest.approx(end, abs=1e-11 * full)
-    for increasing in (True, False):
-        branch = operator.branch(increasing)
-        level = branch.values[0] + share * (branch.values[-1] - branch.values[0])
-        assert branch.value(branch.inverse(level)) == pytest.approx(level, abs=1e-11 * full)
-
-
-def test_branch_is_what_the_operator_follows():
-    operator = example()
-    operator.step(1.0)
-    rising, falling = operator.branch(True), operator.branch(False)
-    expected = {u: operator.peek(u) for u in np.linspace(-2.0, 3.0, 21)}
-    operator.step(-1.0)
-    for u, y in expected.items():
-        assert (rising if u >= 1.0 else falling).value(u) == y
-    assert rising.value(0.0) == expected[1.0]
-    for branch, u in ((rising, 1.5), (falling, 0.2)):
-        numeric = (branch.value(u + 1e-5) - branch.value(u - 1e-5)) / 2e-5
-        assert branch.slope(u) == pytest.approx(numeric, abs=1e-6)
-    assert rising.inverse([-9.0, 9.0]).tolist() == [1.0, 3.0]
-    assert falling.inverse([-9.0, 9.0]).tolist() == [-2.0, 1.0]
 
 
 def test_nothing_but_numbers_comes_out():
@@ -121,8 +111,64 @@ def test_without_stiffness_saturation_is_a_plateau():
     assert flat.invert(1.0) == (0.0, 0.7, True)
 
 
+def test_a_negative_gain_makes_the_output_lag():
+    operator = example(**LAGGING)
+    rising = operator.simulate(np.linspace(-2.0, 3.0, 60))
+    falling = operator.simulate(np.linspace(3.0, -2.0, 60))
+    assert np.all(np.diff(rising) > 0.0) and np.all(np.diff(falling) < 0.0)
+    assert np.all(rising[1:-1] < falling[::-1][1:-1])
+    leading = example(gain=0.45)
+    assert np.all(leading.simulate(np.linspace(-2.0, 3.0, 60))[1:-1]
+                  > leading.simulate(np.linspace(3.0, -2.0, 60))[::-1][1:-1])
+
+
+def test_dead_zones_bend_the_output_and_nothing_else():
+    straight, bent = example(**LAGGING), example(**LAGGING, **BENT)
+    u = np.random.default_rng(0).uniform(-2.0, 3.0, 40)
+    x = straight.simulate(u) - 0.4
+    assert bent.simulate(u) == pytest.approx(
+        0.4 + x + 1.5 * np.maximum(x, 0.0) - 2.3 * np.maximum(x - 1.0, 0.0))
+    assert bent.save() == straight.save()
+
+
+@pytest.mark.parametrize('operator', [
+    example(), example(**LAGGING), example(**LAGGING, **BENT), example(exponent=1.0, shape=0.5)])
+def test_a_sequence_is_as_many_steps(operator):
+    u = np.concatenate([np.random.default_rng(1).uniform(-2.5, 3.5, 50), [3.2, 3.4, 0.1, 0.1]])
+    twin = operator_from_dict(operator.to_dict())
+    assert operator.simulate(u) == pytest.approx([twin.step(v) for v in u], abs=1e-12)
+    assert operator.save() == twin.save()
+    assert operator.simulate([0.2, math.nan, 9.0]) == pytest.approx(
+        [twin.step(v) for v in (0.2, math.nan, 9.0)], abs=1e-12)
+    assert operator.save() == twin.save()
+
+
+@pytest.mark.parametrize('exponent', [1.0, 1.4, 2.0, 7.0, 100.0])
+def test_compiled_travel_is_the_hypergeometric_function(exponent):
+    b = 1.0 / exponent
+    pole = float(psi(1.0) - psi(b))
+    for w in (-1.0, -0.6, -1e-6, 0.0, 0.3, 0.7, 0.95, 0.999):
+        for curl in (0.0, 0.6, 30.0, 199.0):
+            z = -curl * (-w) ** exponent if w < 0.0 else w ** exponent
+            expected = w * hyp2f1(1.0, b, 1.0 + b, z)
+            found = kernel.travel(w, 1.0 - w, curl, exponent, pole)
+            assert found == pytest.approx(expected, rel=1e-11)
+            back = kernel.reached(found, curl, exponent, pole)
+            assert back == pytest.approx(w, abs=1e-12)
+
+
+def test_a_file_without_dead_zones_is_read():
+    old = {key: value for key, value in example().to_dict().items()
+           if key not in ('thresholds', 'bends')}
+    assert operator_from_dict(old).simulate([1.0, 2.0, 0.5]) == pytest.approx(
+        example().simulate([1.0, 2.0, 0.5]), abs=0.0)
+
+
 @pytest.mark.parametrize('change, message', [
     ({'stiffness': -0.1}, 'both signs'),
+    ({'stiffness': 1.0, 'gain': -0.53}, 'both signs, and a gain beyond 0.520833'),
+    ({'thresholds': [1.0, 0.0], 'bends': [1.0, 1.0]}, 'strictly increasing'),
+    ({'thresholds': [1.0], 'bends': [-1.0]}, 'stay positive'),
     ({'rate': 0.0}, 'above 0'),
     ({'shape': 0.4}, 'at least 0.5'),
     ({'shape': 1e9}, 'at most 100'),

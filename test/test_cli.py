@@ -315,7 +315,7 @@ def test_wrong_usage_has_status_2(arguments, capsys):
 
 
 @pytest.mark.parametrize('command', ['identify', 'compare', 'predict', 'invert', 'simulate',
-                                     'effects'])
+                                     'effects', 'operators'])
 def test_every_command_explains_itself(command, capsys):
     with pytest.raises(SystemExit) as left:
         main([command, '--help'])
@@ -366,6 +366,29 @@ def test_an_interrupt_is_one_line(bench, capsys, monkeypatch):
     monkeypatch.setattr(MuscleModel, 'load', interrupt)
     assert main(['compare', '--model', 'm', '--data', 'd']) == 130
     assert capsys.readouterr().err == 'hysteresis compare: interrupted\n'
+
+
+def test_a_muscle_that_creeps_in_one_long_hold_gets_a_diagnosis(tmp_path, capsys):
+    """One trial of a pressure muscle: a ramp, then 240 s in which only the length moves."""
+    time = np.arange(2600) * 0.1
+    pressure = 3e5 * np.minimum(time / 20.0, 1.0)
+    # Rubber gives way with 3 s and with 90 s after each step of the pressure.
+    length = -0.012 * (pressure / 3e5) ** 1.3 + np.random.default_rng(0).normal(0.0, 2e-5, 2600)
+    for creep, constant in ((0.001, 3.0), (0.0015, 90.0)):
+        kernel = np.exp(-time / constant) * 0.1 / constant
+        length -= creep * np.convolve(pressure / 3e5, kernel)[:2600]
+    write_csv({'time': time, 'trial': np.zeros(2600), 'pressure': pressure, 'length': length},
+              tmp_path / 'hold.csv')
+    model = f'{tmp_path}/model.yaml'
+    assert main(['identify', '--operator', 'preisach', '--levels', '4', '5', '--length',
+                 f'{tmp_path}/hold.csv', '-o', model]) == 0
+    assert main(['diagnose', '--model', model, '--data', f'{tmp_path}/hold.csv', '--jobs', '1',
+                 '--json', f'{tmp_path}/found.json']) == 0
+    found = json.loads((tmp_path / 'found.json').read_text())
+    assert found['verdict'] == 'unknown' or found['missing'] == ['creep']
+    creep, = (row for row in found['ranking'] if row['effect'] == 'creep')
+    assert creep['rmse_after'] < creep['rmse_before']
+    assert 'both signs' not in capsys.readouterr().err
 
 
 def test_lists_of_trials():

@@ -120,16 +120,18 @@ def test_order_of_the_rows_of_other_trials_does_not_matter(tables, identified):
     assert again.length_fit.strength == identified.length_fit.strength
 
 
-@pytest.mark.parametrize('operator, kind', [
-    ('play', PrandtlIshlinskii), ('bouc-wen', BoucWen), ('linear', Linear)])
-def test_the_cascade_is_made_of_any_operator(tables, operator, kind):
+# The line's error is 13.8 % of the length and 10.7 % of the force.
+@pytest.mark.parametrize('operator, kind, length_percent, force_percent', [
+    ('play', PrandtlIshlinskii, 13.5, 11.2), ('bouc-wen', BoucWen, 2.6, 0.35),
+    ('linear', Linear, 13.8, 10.8)])
+def test_the_cascade_is_made_of_any_operator(
+        tables, operator, kind, length_percent, force_percent):
     length, force = tables
     found = identify(length, force, operator=operator, **FITTED)
     assert isinstance(found.model.force_stage, kind)
     assert isinstance(found.model.length_stage, kind)
-    verified = mean_percent(found, 'length', 'verification')
-    assert verified < 1.5 * mean_percent(found, 'length', 'verification', 'linear')
-    assert np.all(np.isfinite(found.model.predict(length)))
+    assert mean_percent(found, 'length', 'verification') < length_percent
+    assert mean_percent(found, 'force', 'verification') < force_percent
 
 
 def test_one_operator_of_a_decreasing_response(tables):

@@ -124,6 +124,13 @@ def test_quick_solution_is_the_careful_one():
     assert again == pytest.approx(weights, abs=1e-12)
 
 
+def test_no_weight_is_below_zero_by_rounding():
+    # A free bias far above them hides the sign of weights that are zero but for rounding.
+    x, _ = solve_nonnegative(np.eye(3), np.array([-1e-14, 1e-14, 1.0]),
+                             np.array([False, False, True]), np.ones(3, dtype=bool))
+    assert x[0] == 0.0 and x[1:] == pytest.approx([1e-14, 1.0])
+
+
 def test_scale_of_the_data_does_not_matter():
     nodes, rows, target, groups = preisach_problem(levels=8)
     options = {'groups': groups, 'scale': cell_areas(nodes), 'penalty': smoothness(nodes)}

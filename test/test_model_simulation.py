@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Simulation of whole measurements: trials, strides, phases, and the paper's linear model."""
+"""Simulation of whole measurements: trials, sets, phases, and the paper's linear model."""
 
 import math
 
@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import LinearModel, Simulator
@@ -17,10 +16,6 @@ from hysteresis_ros.model.simulation import trials_of, turning_rows
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY, STRENGTHS, wandering_voltage
 
 VOLTAGE = wandering_voltage(800, seed=2)
-# What depends on time makes rows between the chosen ones matter.
-WITH_TIME = ('thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'viscous_friction',
-             'inertia', 'latency', 'creep', 'ambient_drift', 'resistance_change', 'r_phase',
-             'fatigue', 'ambient_temperature')
 
 
 def table(trials=((0.0, 4.0, 2.0), (1.0, 5.0)), **columns):
@@ -96,62 +91,37 @@ def test_an_arm_run_without_a_first_stage_ignores_the_load():
     np.testing.assert_allclose(GEOMETRY.length(model.predict(arm_run(voltage))), lengths, atol=2e-8)
 
 
+@pytest.mark.parametrize('jobs', [1, 2])
+def test_many_sets_in_one_call_are_those_of_single_runs(jobs):
+    model = bicep_model()
+    columns = arm_run(VOLTAGE, 0.1).columns
+    run = Measurement.from_columns({**columns, 'trial': np.arange(len(VOLTAGE)) // 300})
+    sets = [[effect_of(model, name) for name in names]
+            for names in ((), *((name,) for name in STRENGTHS), ('inertia', 'unequal_muscles'))]
+    simulator = Simulator(model, run)
+    found = simulator.run_many(sets, jobs=jobs)
+    assert found.shape == (len(sets), len(VOLTAGE))
+    for effects, rows in zip(sets, found):
+        np.testing.assert_array_equal(rows, simulator.run(effects))
+    assert len(np.unique(found, axis=0)) > 20
+
+
+def test_no_sets_are_no_rows():
+    assert Simulator(bicep_model(), arm_run([1.0, 2.0])).run_many([]).shape == (0, 2)
+
+
+@pytest.mark.parametrize('jobs', [1, 2])
+def test_an_error_in_one_of_many_sets_is_raised(jobs):
+    simulator = Simulator(bicep_model(geometry=None), arm_run([1.0, 2.0]))
+    with pytest.raises(ParameterError, match='no arm geometry'):
+        simulator.run_many([[], []], jobs=jobs)
+
+
 @pytest.mark.parametrize('x, expected', [
     ([0.0, 1.0, 2.0, 1.0, 0.0], [1, 0, 1, 0, 1]), ([0.0, 1.0, 1.0, 0.0, 0.0], [1, 0, 1, 0, 1]),
     ([0.0, 0.0, 1.0, 1.0, 2.0], [1, 0, 0, 0, 1]), ([3.0], [1]), ([2.0, 2.0], [1, 1])])
 def test_turns_are_where_the_direction_changes(x, expected):
     assert turning_rows(np.array(x)).tolist() == [bool(value) for value in expected]
-
-
-@pytest.mark.parametrize('names', [
-    (), *((name,) for name in catalogue() if name not in WITH_TIME),
-    ('supply_sag', 'stress_dependent_strain', 'coulomb_friction', 'backlash')])
-def test_stride_is_exact_in_the_rows_it_visits(names):
-    model = bicep_model(names)
-    run = arm_run(VOLTAGE, 0.1)
-    full = Simulator(model, run).run(model.effects)
-    seen = []
-    strided = Simulator(model, run, stride=10).run(model.effects, seen)
-    (inputs, rows, count), = seen
-    assert count == len(VOLTAGE) and len(inputs) == len(rows) < 200
-    assert set(range(0, count, 10)) <= set(rows.tolist())
-    exact = 1e-9 if len(names) < 2 else 1e-7
-    np.testing.assert_allclose(strided[rows], full[rows], rtol=0.0, atol=exact)
-
-
-def test_judged_rows_are_exact_in_every_trial_and_at_the_ends_of_ramps():
-    """Rows are counted from the start of the table, wherever a trial begins."""
-    model = bicep_model()
-    ramp = np.concatenate((np.linspace(0.5, 5.5, 23), np.full(14, 5.5), np.linspace(5.5, 1.5, 19),
-                           np.full(31, 1.5)))
-    count = len(ramp)
-    run = Measurement.from_columns({
-        'time': np.tile(0.1 * np.arange(1, count + 1), 3),
-        'trial': np.repeat(np.arange(3.0), count),
-        'voltage': np.tile(ramp, 3), 'angle': np.ones(3 * count)})
-    full = Simulator(model, run).run([])
-    strided = Simulator(model, run, stride=10).run([])
-    np.testing.assert_allclose(strided[::10], full[::10], rtol=0.0, atol=1e-9)
-    # A straight line over the end of a ramp would be off by degrees.
-    assert np.degrees(np.max(np.abs(strided - full))) < 1.0
-
-
-@pytest.mark.parametrize('name', [name for name in WITH_TIME if name != 'latency'])
-def test_stride_comes_close_where_time_counts(name):
-    model = bicep_model([name])
-    run = arm_run(VOLTAGE, 0.1, ambient_temperature=np.linspace(20.0, 30.0, len(VOLTAGE)))
-    full = Simulator(model, run).run(model.effects)
-    seen = []
-    strided = Simulator(model, run, stride=5).run(model.effects, seen)
-    rows = seen[-1][1]
-    error = np.degrees(np.abs(strided - full)[rows])
-    assert np.max(error) < 0.1
-
-
-def test_a_settled_run_is_never_strided():
-    model = bicep_model()
-    run = arm_run(wandering_voltage(50))
-    np.testing.assert_array_equal(Simulator(model, run, stride=10).run([]), model.predict(run))
 
 
 def test_phase_is_in_agreement_with_the_response_it_causes():
@@ -175,9 +145,9 @@ def test_a_strong_effect_of_the_phase_agrees_with_the_phase_it_causes(monkeypatc
     given = outputs_given(monkeypatch)
     angles = simulator.run([effect])
     trial, = simulator.trials
-    respond = simulator._responder(Chain([effect], model.surroundings), None)
-    again, _ = respond(trial, trial.inputs._replace(phase=model.martensite(given[-1])))
-    assert np.sqrt(np.mean((again - angles) ** 2)) < math.radians(0.1)
+    respond = simulator._responder(Chain([effect], model.surroundings))
+    again = respond(trial, trial.inputs._replace(phase=model.martensite(given[-1])))
+    assert np.sqrt(np.mean((again.values - angles) ** 2)) < math.radians(0.1)
 
 
 def outputs_given(monkeypatch):
@@ -215,15 +185,7 @@ def test_of_the_passes_for_the_phase_the_last_ones_inputs_are_given():
         **run.columns, 'trial': np.arange(len(VOLTAGE)) // 300})
     seen = []
     Simulator(model, run).run(model.effects, seen)
-    assert [count for _, _, count in seen] == [300, 300, 200]
-
-
-@pytest.mark.parametrize('name', ['viscous_friction', 'inertia'])
-def test_an_arm_in_motion_is_never_strided(name):
-    model = bicep_model([name])
-    run = arm_run(VOLTAGE, 0.1)
-    np.testing.assert_array_equal(
-        Simulator(model, run, stride=10).run(model.effects), model.predict(run))
+    assert [len(inputs) for inputs in seen] == [300, 300, 200]
 
 
 def test_martensite_is_the_long_phase_of_a_muscle_that_contracts():
@@ -302,7 +264,3 @@ def test_linear_prediction_of_the_arm_balances_it():
 def test_linear_prediction_needs_a_linear_model():
     with pytest.raises(ParameterError, match='no linear model'):
         bicep_model(linear=None).predict(table(), 'linear')
-
-
-def test_strengths_cover_every_effect_of_these_tests():
-    assert set(WITH_TIME) <= set(STRENGTHS)

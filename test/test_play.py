@@ -4,14 +4,13 @@
 
 import json
 import math
-from unittest import mock
 
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
 
 from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.operators import Preisach, PrandtlIshlinskii, operator_from_dict, play
+from hysteresis_ros.operators import Preisach, PrandtlIshlinskii, operator_from_dict
 
 
 def example(sign=1.0):
@@ -58,7 +57,7 @@ def test_play_is_a_preisach_operator_with_its_weight_on_a_line():
 
 
 @pytest.mark.parametrize('sign', [1.0, -1.0])
-def test_inverse_and_branch_are_exact(sign):
+def test_inverse_is_exact(sign):
     operator = example(sign)
     low, high = operator.output_range
     rng = np.random.default_rng(0)
@@ -67,13 +66,6 @@ def test_inverse_and_branch_are_exact(sign):
         assert not found.saturated
         assert operator.peek(found.input) == found.output
         assert abs(found.output - y) < 1e-12 * (high - low)
-        for increasing in (True, False):
-            branch = operator.branch(increasing)
-            inputs = np.linspace(branch.knots[0], branch.knots[-1], 17)
-            expected = [operator.peek(u) for u in inputs]
-            np.testing.assert_allclose(branch.value(inputs), expected, atol=1e-12)
-            back = branch.inverse(np.array(expected))
-            np.testing.assert_allclose(branch.value(back), expected, atol=1e-12)
         operator.step(found.input)
 
 
@@ -116,14 +108,12 @@ def test_dead_band_counts_from_the_last_movement():
     assert operator.invert(operator.output + 0.01, dead_band=0.02).input == 2.0
 
 
-@pytest.mark.parametrize('worth', [0, 20, 10 ** 9])
-def test_simulate_equals_the_steps(worth):
+def test_simulate_equals_the_steps():
     one, other = example(), example()
     inputs = 2.0 + 3.5 * np.sin(np.linspace(0.0, 30.0, 2000))
     inputs[500:600] = np.random.default_rng(1).uniform(-1.0, 5.0, 100)
     expected = [one.step(u) for u in inputs]
-    with mock.patch.object(play, '_WORTH_AN_ARRAY', worth):
-        np.testing.assert_allclose(other.simulate(inputs), expected, atol=1e-12)
+    np.testing.assert_array_equal(other.simulate(inputs), expected)
     assert other.save() == one.save()
     np.testing.assert_array_equal(other.simulate([math.nan, 1.0]), [one.output, one.step(1.0)])
 

@@ -4,13 +4,12 @@
 
 import json
 import math
-from unittest import mock
 
 from hypothesis import given, settings, strategies as st
 import numpy as np
 
 from hysteresis_ros.operators import (
-    Preisach, cells, operator_from_dict, preisach, signed_lengths)
+    Preisach, cells, operator_from_dict, signed_lengths)
 
 slow = settings(deadline=None, max_examples=80, derandomize=True)
 shares = st.floats(0.0, 1.0)
@@ -206,20 +205,19 @@ def test_inverse_of_an_output_leads_back(data):
 
 
 @slow
-@given(st.data(), st.floats(0.0, 0.1), st.floats(0.0, 2.0))
-def test_options_of_the_inverse_keep_their_promises(data, dead_band, slope_floor):
+@given(st.data(), st.floats(0.0, 0.1))
+def test_the_dead_band_of_the_inverse_keeps_its_promise(data, dead_band):
     operator = data.draw(operators())
     follow(operator, data.draw(histories(operator)))
     low, high = operator.output_range
     y = low + data.draw(shares) * (high - low)
-    found = operator.invert(y, dead_band=dead_band, slope_floor=slope_floor)
+    found = operator.invert(y, dead_band=dead_band)
     slack = 1e-12 * full(operator)
     assert found.output == operator.peek(found.input) or abs(
         found.output - operator.peek(found.input)) < slack
     change = abs(y - operator.output)
-    assert slope_floor * abs(found.input - operator.input) <= change * (1.0 + 1e-9) + slack
     if found.input == operator.input:
-        assert change <= max(dead_band, slack) or slope_floor > 0.0
+        assert change <= max(dead_band, slack)
     exact = operator.invert(y)
     assert abs(found.input - operator.input) <= abs(exact.input - operator.input) + 1e-12
 
@@ -231,7 +229,7 @@ def test_no_float_breaks_it(data, values):
     for value in values:
         y = operator.step(value)
         found = operator.invert(value)
-        twice = operator.invert(value, dead_band=0.01, slope_floor=0.1)
+        twice = operator.invert(value, dead_band=0.01)
         numbers = [y, operator.peek(-value), operator.input, *found[:2], *twice[:2]]
         assert all(map(math.isfinite, numbers))
         assert operator.lower <= operator.input <= operator.upper
@@ -241,8 +239,8 @@ def test_no_float_breaks_it(data, values):
 
 
 @slow
-@given(st.data(), st.sampled_from([0, 3, 50]))
-def test_batch_equals_steps(data, worth):
+@given(st.data())
+def test_batch_equals_steps(data):
     operator = data.draw(operators())
     follow(operator, data.draw(histories(operator)))
     twin = copy(operator)
@@ -250,9 +248,7 @@ def test_batch_equals_steps(data, worth):
     inputs = np.concatenate([np.linspace(a, b, 9) for a, b in zip(ends[:-1], ends[1:])] or [[]])
     inputs = inputs + data.draw(st.sampled_from([0.0, 0.3]))
     expected = follow(operator, inputs)
-    with mock.patch.object(preisach, '_WORTH_AN_ARRAY', worth):
-        outputs = twin.simulate(inputs)
-    np.testing.assert_allclose(outputs, expected, rtol=0.0, atol=1e-12 * full(operator))
+    np.testing.assert_array_equal(twin.simulate(inputs), expected)
     assert twin.save() == operator.save()
     sums = (operator.areas(inputs) @ operator.weights + operator.bias
             + signed_lengths(operator.nodes, inputs) @ operator.reversible)
@@ -273,23 +269,6 @@ def test_saved_memory_has_the_same_future(data):
     assert twin.direction == operator.direction
     assert follow(twin, future) == follow(operator, future)
     assert twin.save() == operator.save()
-
-
-@slow
-@given(st.data(), st.booleans())
-def test_branch_agrees_with_peek(data, increasing):
-    operator = data.draw(operators())
-    follow(operator, data.draw(histories(operator)))
-    branch = operator.branch(increasing)
-    inputs = [place(operator, share) for share in data.draw(st.lists(shares, max_size=8))]
-    inputs = [u for u in inputs if (u >= operator.input) == increasing or u == operator.input]
-    inputs += branch.knots.tolist()
-    expected = [operator.peek(u) for u in inputs]
-    np.testing.assert_allclose(
-        branch.value(np.array(inputs)), expected, rtol=0.0, atol=1e-12 * full(operator))
-    back = branch.inverse(np.array(expected))
-    np.testing.assert_allclose(
-        branch.value(back), expected, rtol=0.0, atol=1e-9 * full(operator))
 
 
 @slow

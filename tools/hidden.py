@@ -15,8 +15,9 @@ from pathlib import Path
 import sys
 import time
 
-import joblib
 import numpy as np
+
+from hysteresis_ros.workers import delayed, in_parallel
 
 # Seeds above this were never looked at while thresholds were chosen.
 FIRST_SEED = 1000
@@ -193,12 +194,11 @@ def main():
     # Seed by seed, so that what is scored so far is a fair sample.
     chosen.sort(key=lambda case: (case[0] in ('strong', 'weak'), case[-1]))
     results = []
-    parallel = joblib.Parallel(n_jobs=args.jobs, return_as='generator')
     seeds = sorted({case[-1] for case in chosen})
-    models = dict(zip(seeds, parallel(
-        joblib.delayed(base_model)(seed, not args.paper_model) for seed in seeds)))
+    models = dict(zip(seeds, in_parallel(
+        [delayed(base_model)(seed, not args.paper_model) for seed in seeds], args.jobs)))
     print(f'{len(models)} specimens identified', file=sys.stderr, flush=True)
-    for row in parallel(joblib.delayed(run)(case, models[case[-1]]) for case in chosen):
+    for row in in_parallel([delayed(run)(case, models[case[-1]]) for case in chosen], args.jobs):
         results.append(row)
         print(f'{len(results)}/{len(chosen)} {row["group"]} {row["protocol"]} {row["truth"]} '
               f'seed {row["seed"]}: {row["verdict"]} {row["missing"]} {row["alternatives"]} '

@@ -23,7 +23,7 @@ from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
 from hysteresis_ros.bridge.board_state import Sample, Status
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.messages import (
-    DISABLE, ENABLE, FAULTS, NO, SET, Telemetry, TELEMETRY)
+    DISABLE, ENABLE, FAULTS, Identity, NO, SET, Telemetry, TELEMETRY)
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError
 
@@ -101,14 +101,15 @@ class Board:
         self._stopping = threading.Event()
         self._news = False          # something for the writer
         self._wanted = False        # whether the board shall be enabled
-        self._target = None         # (voltage, wall time at which it was set)
+        # (voltage, wall time at which it was set)
+        self._target: tuple[float, float] | None = None
         self._online = False
         self._problem = ''
-        self._write_problem = None
-        self._supply = None         # averaged over so many samples:
+        self._write_problem: BoardError | ProtocolError | None = None
+        self._supply: float | None = None   # averaged over so many samples:
         self._supply_samples = 0
-        self._identity = None
-        self._sample = None
+        self._identity: Identity | None = None
+        self._sample: Sample | None = None
         self._received = 0.0        # wall time of the latest sample
         self._limit = ''
         self._refusal = ''
@@ -141,7 +142,8 @@ class Board:
         self._say_zero()
         deadline = time.monotonic() + STOP_PATIENCE
         with self._wake:
-            while self._online and self._sample.enabled and time.monotonic() < deadline:
+            while (self._online and self._sample is not None and self._sample.enabled
+                   and time.monotonic() < deadline):
                 self._wake.wait(deadline - time.monotonic())
             self._stopping.set()
             self._wake.notify_all()
@@ -228,8 +230,9 @@ class Board:
         self._wake.notify_all()
 
     def _expired(self) -> bool:
-        age = time.monotonic() - self._target[1]
-        return age > self._timeouts.setpoint * self.slowness
+        if self._target is None:
+            return True
+        return time.monotonic() - self._target[1] > self._timeouts.setpoint * self.slowness
 
     # The reading thread
 
@@ -291,13 +294,14 @@ class Board:
     def _take(self, telemetry: Telemetry) -> None:
         reading = self._encoder.update(self._clock.follow(telemetry.time), telemetry.counts,
                                        telemetry.index, telemetry.latch)
-        self._smooth(telemetry.supply)
+        supply = self._smooth(telemetry.supply)
         sample = Sample(
             self._clock.time, reading.angle, reading.velocity, reading.fresh,
-            self.pwm.voltage(telemetry.duty, self._supply), self._supply, telemetry.ambient,
+            self.pwm.voltage(telemetry.duty, supply), supply, telemetry.ambient,
             telemetry.enabled, telemetry.faults, reading.fault)
         with self._wake:
-            if not self._online or sample.enabled != self._sample.enabled:
+            if (not self._online or self._sample is None
+                    or sample.enabled != self._sample.enabled):
                 self._tell_writer()
             self._online = True
             self._problem = ''
@@ -305,14 +309,16 @@ class Board:
             self._received = time.monotonic()
         self._on_sample(sample)
 
-    def _smooth(self, supply: float) -> None:
-        """Average the supply, so that its noise does not move the muscle to and fro."""
+    def _smooth(self, supply: float) -> float:
+        """Return the supply's average, so that its noise does not move the muscle to and fro."""
         before = self._supply
         if before is None or abs(supply - before) > SUPPLY_JUMP * self._nominal_supply:
-            self._supply, self._supply_samples = supply, 1
+            average, self._supply_samples = supply, 1
         else:
             self._supply_samples = min(self._supply_samples + 1, SUPPLY_SAMPLES)
-            self._supply += (supply - before) / self._supply_samples
+            average = before + (supply - before) / self._supply_samples
+        self._supply = average
+        return average
 
     def _lose(self, problem: str) -> None:
         with self._wake:
@@ -342,7 +348,7 @@ class Board:
 
     def _command(self) -> tuple[str, Fields | None] | None:
         """Return what the board has to hear now: (kind, fields), or None."""
-        if self._wanted != self._sample.enabled:
+        if self._sample is None or self._wanted != self._sample.enabled:
             return (ENABLE if self._wanted else DISABLE, None)
         if not self._wanted:
             return None
@@ -350,15 +356,16 @@ class Board:
 
     def _duty(self) -> float:
         self._limit = ''
-        if self._target is None or self._expired():
+        supply = self._supply
+        if self._target is None or supply is None or self._expired():
             return 0.0
-        off = abs(self._supply - self._nominal_supply)
+        off = abs(supply - self._nominal_supply)
         if off > self._supply_tolerance * self._nominal_supply:
             self._limit = (
-                f'the supply measures {self._supply:.3g} V, {self._nominal_supply:g} V expected: '
+                f'the supply measures {supply:.3g} V, {self._nominal_supply:g} V expected: '
                 'output off; check the supply and the parameter supply_voltage')
             return 0.0
-        drive = self.pwm.drive(self._target[0], self._supply)
+        drive = self.pwm.drive(self._target[0], supply)
         self._limit = drive.limit
         return drive.duty
 

@@ -14,7 +14,7 @@ class BoardClock:
 
     def __init__(self) -> None:
         self._milliseconds = 0
-        self._last = None
+        self._last = 0
 
     @property
     def time(self) -> float:

@@ -8,6 +8,7 @@ import importlib
 import os
 import threading
 import time
+from typing import Any
 
 import serial
 
@@ -107,7 +108,7 @@ class BoardLink:
         self.decoder = Decoder()
         self.lost_frames = 0
         self._timeouts = timeouts
-        self._expected = None       # sequence number of the board's next frame
+        self._expected: int | None = None   # sequence number of the board's next frame
         self._sequence = 0
         self._bytes = 0
         self._writing = threading.Lock()
@@ -119,7 +120,7 @@ class BoardLink:
             check_url(port)
         self._settings = {'baudrate': baud, 'timeout': READ_TIMEOUT,
                           'write_timeout': timeouts.write, 'exclusive': True}
-        self._serial = None
+        self._serial: Any = None    # pyserial has no type hints
         try:
             self._make()
         except serial.SerialException:
@@ -142,7 +143,7 @@ class BoardLink:
             self._serial.open()
         except (OSError, ValueError) as error:
             number = getattr(error, 'errno', None)
-            reason = _HINTS.get(number) or (os.strerror(number) if number else str(error))
+            reason = _HINTS.get(number or 0) or (os.strerror(number) if number else str(error))
             reason = reason.replace(f'Could not open port {self.port}: ', '')
             raise BoardError(f'port {self.port} cannot be opened: {reason}') from None
         self.decoder.feed(b'\n')

@@ -105,14 +105,16 @@ class Encoder:
 
     def reset(self) -> None:
         """Forget everything: the next sample is the first."""
-        self._position = None       # counts from the angle `zero`, unwrapped
-        self._counter = None        # the counter as last believed
-        self._time = None
-        self._suspect = None        # (time, counter) of a sample that was not believed
+        self._begun = False
+        self._position = 0          # counts from the angle `zero`, unwrapped
+        self._counter = 0           # the counter as last believed
+        self._time = 0.0
+        # (time, counter) of a sample that was not believed
+        self._suspect: tuple[float, int] | None = None
         self._restarted = False
-        self._history = collections.deque()
-        self._index = None
-        self._index_position = None
+        self._history: collections.deque[tuple[float, int]] = collections.deque()
+        self._index: int | None = None
+        self._index_position: int | None = None
         self._fault = ''
 
     def restart(self) -> None:
@@ -122,7 +124,7 @@ class Encoder:
         The arm is taken to be where it was; that is a fault until the index pulse or
         `clear_fault` ends it.
         """
-        if self._position is not None:
+        if self._begun:
             self._restarted = True
             self._fault = ('the board has started anew: its encoder counter was lost, the angle '
                            'is carried on from before and may be off')
@@ -135,7 +137,7 @@ class Encoder:
     @property
     def angle(self) -> float | None:
         """Angle in rad of the last sample that was believed; None before the first."""
-        return None if self._position is None else self._angle(self._position)
+        return self._angle(self._position) if self._begun else None
 
     def update(self, time: float, counter: int, index: int = 0,
                latch: int | None = None) -> Reading:
@@ -158,7 +160,7 @@ class Encoder:
         Reading
 
         """
-        if self._position is None or self._restarted:
+        if not self._begun or self._restarted:
             self._begin(time, counter)
             self._look_at_index(counter, index, latch)
             return self._reading(True, '')
@@ -219,13 +221,14 @@ class Encoder:
 
     def _at_index(self, position: int) -> None:
         """Compare or correct the position with the index pulse that came at `position`."""
-        first = self._index_position is None
+        expected, first = self._index_position, self._index_position is None
         if self._index_use == 'home':
-            self._index_position = round((self._index_angle - self._zero) / self._scale)
-        elif first:
-            self._index_position = position
+            expected = round((self._index_angle - self._zero) / self._scale)
+        elif expected is None:
+            expected = position
+        self._index_position = expected
         turn = self._counts_per_revolution
-        error = (position - self._index_position + turn // 2) % turn - turn // 2
+        error = (position - expected + turn // 2) % turn - turn // 2
         if self._index_use == 'home':
             self._move(-error)
             self._fault = ''

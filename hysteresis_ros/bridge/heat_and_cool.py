@@ -61,10 +61,10 @@ class HeatAndCool:
         self._voltage = voltage
         self._times = {'heating': heat_time, 'cooling': cool_time}
         self._phase = 'heating'
-        self._begun = None          # time at which the phase began
+        self._begun: float | None = None    # time at which the phase began
         self._applied = 0.0         # how long the phase's voltage was really applied
-        self._last = None
-        self._still_since = None    # (time, angle)
+        self._last = 0.0
+        self._still_since = (0.0, 0.0)      # (time, angle)
 
     def update(self, time: float, angle: float, applied: float) -> Phase:
         """

@@ -145,7 +145,7 @@ class Telemetry(NamedTuple):
     duty: float
     enabled: bool
     faults: tuple = ()
-    index: int = 0
+    index: int = 0      # type: ignore[assignment]  # a tuple's method that nobody calls here
     latch: 'int | None' = None
     ambient: 'float | None' = None
     accepted: 'int | None' = None
@@ -159,7 +159,8 @@ class Telemetry(NamedTuple):
         dict of str to str or int or float
 
         """
-        fields = {'time': self.time, 'counts': self.counts, 'index': self.index}
+        fields: dict[str, str | int | float] = {
+            'time': self.time, 'counts': self.counts, 'index': self.index}
         if self.latch is not None:
             fields['latch'] = self.latch
         fields.update(supply=write_number(self.supply, 3), duty=self.duty, on=self.enabled)

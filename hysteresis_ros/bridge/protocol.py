@@ -13,23 +13,22 @@ hexadecimal digits. A line that begins with ``#`` is a remark for people and car
 Everything else is a bad line: counted, never acted on. `docs/protocol.md` is the whole page.
 """
 
-from __future__ import annotations
-
 import binascii
 from collections.abc import Callable
 import math
 import numbers
 import re
-from typing import Mapping, NamedTuple, TYPE_CHECKING, Union
+from typing import Mapping, NamedTuple, TypeVar, Union
 
 from hysteresis_ros.errors import ProtocolError
-
-if TYPE_CHECKING:
-    from hysteresis_ros.bridge.protocol import Fields
 
 VERSION = 1
 MAX_LINE = 192
 SEQUENCE_LIMIT = 1 << 16
+
+Number = TypeVar('Number', int, float)
+# What a frame can carry: text without spaces, and numbers.
+Fields = Mapping[str, Union[str, int, float]]
 
 _BODY = re.compile(rb'([a-z]+) ([0-9]{1,5})((?: [a-z_]+=[!-)+-~]+)*)')
 _WORD = re.compile(r'[a-z]+')
@@ -308,7 +307,7 @@ class Decoder:
         self.frames = 0
         self.remarks = 0
         self.bad_lines = 0
-        self.last_bad = None
+        self.last_bad: BadLine | None = None
         self._line = bytearray()
 
     def feed(self, data: bytes) -> list[Line]:
@@ -326,7 +325,7 @@ class Decoder:
             What these bytes completed, in order.
 
         """
-        found = []
+        found: list[Line] = []
         *ends, tail = data.split(b'\n')
         for piece in ends:
             self._append(piece)
@@ -339,7 +338,8 @@ class Decoder:
     def _append(self, piece: bytes) -> None:
         self._line += piece[:MAX_LINE - len(self._line)]
 
-    def _take(self) -> bytes:
+    def _take(self) -> Line | None:
+        line: Line | None
         if len(self._line) >= MAX_LINE:
             line = BadLine(f'longer than {MAX_LINE} bytes', _printable(bytes(self._line)), '')
         else:

@@ -20,7 +20,7 @@ class RealStamps:
     """
 
     def __init__(self) -> None:
-        self._offset = None
+        self._offset: float | None = None
         self._last_time = 0.0
         self._last_stamp = -float('inf')
 
@@ -73,7 +73,7 @@ class SimulatedStamps:
         self._start = start
         self._speed = speed
         self._last_stamp = start
-        self._last_wall = None
+        self._last_wall: float | None = None
 
     def stamp(self, time: float, wall: float) -> float:
         """
@@ -110,5 +110,5 @@ class SimulatedStamps:
             The stamp of now.
 
         """
-        return self.stamp(self._last_stamp - self._start
-                          + self._speed * (wall - self._last_wall), wall)
+        passed = 0.0 if self._last_wall is None else wall - self._last_wall
+        return self.stamp(self._last_stamp - self._start + self._speed * passed, wall)

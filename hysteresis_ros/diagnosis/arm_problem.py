@@ -6,6 +6,8 @@ Effects judged on runs of an arm, with the weights that the bench gave, frozen.
 Refitted weights would absorb most of what an effect does.
 """
 
+import os
+
 import numpy as np
 
 from hysteresis_ros.diagnosis.problem import Problem
@@ -45,9 +47,10 @@ class ArmProblem(Problem):
         -------
         ndarray, shape (len(sets), n)
         """
-        if not len(sets):
-            return np.zeros((0, len(self.measured)))
-        return np.stack([self.simulate(effects) for effects in sets])
+        jobs = self.jobs if self.jobs > 0 else os.cpu_count() or 1
+        runs = [simulator.run_many(sets, jobs)[:, rows]
+                for simulator, rows in zip(self.simulators, self.chosen)]
+        return np.concatenate(runs, axis=1)
 
     def completed(self, effects):
         """Return the model with these effects."""
@@ -64,9 +67,6 @@ class ArmProblem(Problem):
             inputs: list[np.ndarray] = []
             base = simulator.run(effects, inputs)
             moved = simulator.run([*effects, Offset(size=step)])
-            areas = np.concatenate([
-                np.apply_along_axis(lambda column: np.interp(
-                    np.arange(count), chosen, column), 0, preisach_rows(stage.nodes, u, True))
-                for u, chosen, count in inputs])
+            areas = np.concatenate([preisach_rows(stage.nodes, u, True) for u in inputs])
             columns.append((((moved - base) / step)[:, None] * areas)[rows])
         return np.concatenate(columns)

@@ -11,7 +11,6 @@ nor its weights have seen takes the evidence's place.
 import itertools
 import math
 
-import joblib
 import numpy as np
 
 from hysteresis_ros.diagnosis import significance
@@ -20,6 +19,7 @@ from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.observable import observable, present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.workers import delayed, in_parallel
 
 SIGNIFICANCE = 0.05
 # Share of blocks in which an effect has to help.
@@ -90,9 +90,9 @@ class BenchSelection:
             len(fit.effects), len(fit.vector), self.error(fit)))
 
     def _in_parallel(self, task, items) -> list[Fit]:
-        tasks = [joblib.delayed(task)(self.fitter, item) for item in items]
-        parallel = joblib.Parallel(n_jobs=self._jobs)(tasks)
-        fits = [fit for fit in self._progress(parallel, len(tasks)) if fit is not None]
+        tasks = [delayed(task)(self.fitter, item) for item in items]
+        results = self._progress(in_parallel(tasks, self._jobs), len(tasks))
+        fits = [fit for fit in results if fit is not None]
         return [fit for fit in fits if np.all(np.isfinite(fit.held_out))]
 
     def error(self, fit) -> float:

@@ -95,7 +95,7 @@ class Covariance:
         self._middle = 0.5 * np.log(shortest * span)
         self._low = np.array([-LARGEST_SCALE, np.log(self._scale / WIDEST),
                               np.log(2.0 * shortest), np.log(self.resolution)])
-        self._high = np.array([LARGEST_SCALE, np.log(WIDEST * self._scale), np.log(max(3.0 * span, 2.0 * shortest)),
+        self._high = np.array([LARGEST_SCALE, np.log(WIDEST * self._scale), np.log(3.0 * span),
                                np.log(WIDEST * self._scale)])
         self._high = np.maximum(self._high, self._low)
         self.points: list[Point] = []

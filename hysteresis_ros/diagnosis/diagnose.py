@@ -11,6 +11,7 @@ from hysteresis_ros.diagnosis.bench_verdict import bench_verdict
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.verdict import Diagnosis
+from hysteresis_ros.workers import one_blas_thread
 
 __all__ = ['Diagnosis', 'diagnose']
 
@@ -19,6 +20,7 @@ def _silent(iterable, total):
     return iterable
 
 
+@one_blas_thread()
 def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
              settings: Settings = Settings(), progress=_silent) -> Diagnosis:
     """
@@ -55,8 +57,3 @@ def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
     found = (bench_verdict(problem, settings, rng, jobs, progress) if problem.refits
              else arm_verdict(problem, settings, rng, progress))
     return dataclasses.replace(found, quantity=problem.response)
-
-
-def with_settings(**changes) -> Settings:
-    """Return the settings with some of them changed."""
-    return dataclasses.replace(Settings(), **changes)

@@ -21,6 +21,7 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.result import Brief, Result
+from hysteresis_ros.workers import one_blas_thread
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,6 +105,7 @@ def rmse(model, measurements) -> float:
     return float(np.sqrt(squares / rows))
 
 
+@one_blas_thread()
 def extend(model, names, train, test=()) -> Extension:
     """
     Add effects and fit them together.

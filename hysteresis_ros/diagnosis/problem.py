@@ -7,8 +7,12 @@ How a model answers to them is told by the kind of the measurements: see `arm_pr
 `bench_problem`.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from hysteresis_ros.effects import Effect
+from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.model.simulation import Simulator
 
 # A long recording is judged on about this many rows; between them nothing new is learned. Weights
@@ -55,12 +59,16 @@ class Problem:
         self.settled = all(m.settled for m in measurements)
         rows = sum(m.rows for m in measurements)
         self.stride = max(1, rows // MOST_ROWS[self.kind])
-        self.simulators = [Simulator(model, m, self.stride) for m in measurements]
+        self.simulators = [Simulator(model, m) for m in measurements]
         self.chosen = [np.arange(0, m.rows, self.stride) for m in measurements]
         self.measured = self.pick([m.column(m.response) for m in measurements])
         self.noise = max(sensor_resolution(m) for m in measurements)
         self._divide()
         self.signals = self._signals()
+
+    def completed(self, effects: Sequence[Effect]) -> MuscleModel:
+        """Return the model with effects; where weights are refitted, with new ones."""
+        raise NotImplementedError
 
     def pick(self, columns) -> np.ndarray:
         """Return the judged rows of a column given for every recording, shape (n,)."""

@@ -13,6 +13,8 @@ import numpy as np
 
 from hysteresis_ros.effects.base import Parameter, Surroundings
 from hysteresis_ros.effects.stages import MaterialEffect
+from hysteresis_ros.kernels.creep import fade, relax
+from hysteresis_ros.kernels.play import follow
 
 
 class StressDependence(MaterialEffect):
@@ -187,11 +189,8 @@ class RPhase(MaterialEffect):
     def drift(self, drive, heat, inputs, surroundings):
         """Return the same for a whole trial at once."""
         half = 0.5 * self.LOOP * surroundings.heat
-        played, state = [], 0.0
-        for value in heat.tolist():
-            state = min(max(state, value - half), value + half)
-            played.append(state)
-        return self._strain(np.array(played), surroundings), np.ones(len(drive))
+        played = follow(np.ascontiguousarray(heat, float), half, 0.0)
+        return self._strain(played, surroundings), np.ones(len(drive))
 
     def _strain(self, heat, surroundings):
         argument = (heat / surroundings.heat - self.position) / self.width
@@ -245,7 +244,7 @@ class Creep(MaterialEffect):
     def advance(self, drive, heat, inputs, surroundings):
         """Return the strain since the last step, in that step's direction."""
         if self.kept:
-            return self._relax(inputs.phase, self._decays(inputs.step), surroundings), 1.0
+            return self._relax(inputs.phase, inputs.step, surroundings), 1.0
         # A ramp is many small steps: what a hold after it shows is the whole ramp's.
         change = drive - (surroundings.cold if self._drive is None else self._drive)
         direction = 0.0
@@ -278,46 +277,31 @@ class Creep(MaterialEffect):
         before = np.concatenate(([1.0], inputs.phase))[begun]
         held = np.where(last >= 0, inputs.time - inputs.time[last], 0.0)
         strain = self._strain(inputs.phase - before, held, surroundings)
-        return strain + self._fading(strain, np.flatnonzero(turned), inputs), np.ones(len(drive))
-
-    def _fading(self, strain, begun, inputs):
-        """Return what earlier runs of the drive have left, given the rows where runs begin."""
-        left, carried = np.zeros(len(strain)), 0.0
         clock = self.FADING / self.t0 * np.cumsum(inputs.step)
-        for row, end in zip(begun, [*begun[1:], len(strain)]):
-            if row > 0:
-                carried = (left[row - 1] * math.exp(clock[row - 1] - clock[row])
-                           + strain[row - 1])
-            left[row:end] = carried * np.exp(clock[row] - clock[row:end])
-        return left
+        return strain + fade(strain, turned, clock), np.ones(len(drive))
 
-    def _decays(self, step):
-        """Return the share of each relaxation that is left after `step` [s], (rows, modes)."""
+    def _times(self):
+        """Return the time constant [s] of each relaxation, (modes,)."""
         # With this first time the sum comes to the logarithm, not beside it, in the long run.
-        times = 3.0 * self.t0 * self.RATIO ** np.arange(self.MODES)
-        return np.exp(-np.asarray(step)[..., None] / times)
+        return 3.0 * self.t0 * self.RATIO ** np.arange(self.MODES)
 
-    def _relax(self, phase, decays, surroundings):
+    def _relax(self, phase, step, surroundings):
         """Bring all relaxations nearer to the phase, and return their strain."""
         if math.isfinite(phase):
             target = phase - 1.0
+            decays = np.exp(-step / self._times())
             self._modes = (target + (np.array(self._modes) - target) * decays).tolist()
         return self._strain_of_modes(sum(self._modes), surroundings)
 
     def _relaxed(self, inputs, surroundings):
-        """Return what `_relax` does for a whole trial, one relaxation after the other."""
+        """Return what `_relax` does for a whole trial."""
         self.start()
+        modes = np.array(self._modes)
         # Where the phase is not known, nothing relaxes.
-        decays = np.where(np.isfinite(inputs.phase)[:, None], self._decays(inputs.step), 1.0)
-        targets = np.nan_to_num(inputs.phase - 1.0).tolist()
-        total = np.zeros(len(targets))
-        for index, column in enumerate(decays.T.tolist()):
-            mode, course = self._modes[index], []
-            for target, decay in zip(targets, column):
-                mode = target + (mode - target) * decay
-                course.append(mode)
-            self._modes[index] = mode
-            total += course
+        targets = np.where(np.isfinite(inputs.phase), inputs.phase - 1.0, np.nan)
+        steps = np.ascontiguousarray(inputs.step, float)
+        total = relax(targets, steps, self._times(), modes)
+        self._modes = modes.tolist()
         return self._strain_of_modes(total, surroundings)
 
     def _strain_of_modes(self, total, surroundings):

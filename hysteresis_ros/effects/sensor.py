@@ -8,6 +8,7 @@ import numpy as np
 
 from hysteresis_ros.effects.base import Parameter
 from hysteresis_ros.effects.stages import SensorEffect
+from hysteresis_ros.kernels.play import follow
 
 
 class EncoderOffset(SensorEffect):
@@ -67,6 +68,14 @@ class Backlash(SensorEffect):
             self._state = value
         self._state = min(max(self._state, value - half), value + half)
         return self._state
+
+    def forward(self, response, inputs):
+        """Do what `step` does for a whole trial."""
+        self.start()
+        course = follow(np.ascontiguousarray(response, float), 0.5 * math.radians(self.B),
+                        float(response[0]))
+        self._state = float(course[-1])
+        return course
 
     def inverse(self, response):
         """Go further by half the play in the direction of the motion."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from hysteresis_ros.effects.base import Parameter
 from hysteresis_ros.effects.stages import DriveEffect
+from hysteresis_ros.kernels.lag import lag
 
 
 # A rate [1/s] that stands for one without bound, which times no time would be no number.
@@ -102,21 +103,16 @@ class FirstOrderLag(ThermalEffect):
         return 0.0 * np.nan_to_num(phase)
 
     def forward(self, signal, inputs, surroundings):
-        """Do what `step` does for a whole trial, with all decays computed at once."""
+        """Do what `step` does for a whole trial."""
         self.start()
-        steps = np.broadcast_to(inputs.step, np.shape(signal))
-        up, down = (np.exp(-min(self.rate(rising), FASTEST) * steps).tolist()
-                    for rising in (True, False))
-        phases = np.broadcast_to(inputs.phase, np.shape(signal))
+        steps, phases = (np.ascontiguousarray(np.broadcast_to(column, np.shape(signal)), float)
+                         for column in (inputs.step, inputs.phase))
         released = self._released(np.concatenate((phases[:1], phases[:-1])), phases, surroundings)
-        values = signal.tolist()
-        heat = self._cold(values[0], surroundings)
-        heats = []
-        for value, rise, fall, given in zip(values, up, down, released.tolist()):
-            heat = value + (heat - value) * (rise if value > heat else fall) + given
-            heats.append(heat)
-        self._heat, self._phase = heat, float(phases[-1])
-        return np.array(heats)
+        heats = lag(np.ascontiguousarray(signal, float), steps,
+                    *(min(self.rate(rising), FASTEST) for rising in (True, False)), released,
+                    float(self._cold(signal[0], surroundings)))
+        self._heat, self._phase = float(heats[-1]), float(phases[-1])
+        return heats
 
     def inverse(self, signal, inputs, surroundings):
         """Return the input that brings the heat to `signal` in ``inputs.step`` seconds."""

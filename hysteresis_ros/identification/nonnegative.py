@@ -59,7 +59,8 @@ def solve_nonnegative(
             ~passive & (gradient < -gradient_tolerance))
         count = int(np.count_nonzero(wrong))
         if count == 0:
-            return np.where(passive, x, 0.0), passive
+            # The tolerance on signs is one of rounding: nothing below the bound is handed on.
+            return np.where(free, x, np.where(passive, np.maximum(x, 0.0), 0.0)), passive
         if count < fewest:
             fewest, tries = count, 3
         elif tries > 0:
@@ -73,7 +74,7 @@ def solve_nonnegative(
         'least squares: no solution found; use a larger strength or fewer levels')
 
 
-def _solve(gram, moment):
+def _solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
     try:
         factor = linalg.cho_factor(gram, check_finite=False)
     except linalg.LinAlgError:

@@ -3,15 +3,16 @@
 """One operator of each kind fitted to inputs and outputs, trial by trial."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from scipy import optimize
 
 from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.identification.bouc_wen import fit_bouc_wen
 from hysteresis_ros.identification.least_squares import (
     SLACK, STRENGTHS, Anchor, WeightFit, fit_weights, quick_weights)
 from hysteresis_ros.operators import (
-    BoucWen, HysteresisOperator, Linear, Preisach, PrandtlIshlinskii, cell_areas, cells,
+    HysteresisOperator, Linear, Preisach, PrandtlIshlinskii, cell_areas, cells,
     signed_areas, signed_lengths)
 
 # The grid reaches at least this far beyond the data, as a share of the data's range.
@@ -27,8 +28,9 @@ SEARCH_ROWS = 400
 def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, groups: np.ndarray,
                  levels: int, anchor: tuple[float, float] | None = None,
                  strength: float | None = None, strengths: Sequence[float] | None = None,
-                 reversible: bool = True,
-                 placed: bool = False) -> tuple[HysteresisOperator, WeightFit | None]:
+                 reversible: bool = True, placed: bool = False,
+                 fitted: np.ndarray | None = None
+                 ) -> tuple[HysteresisOperator, WeightFit | None]:
     """
     Fit an operator that rises with its input.
 
@@ -55,6 +57,8 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
         hysteresis: elastic stretch, a force that hardly loops. The paper's has none.
     placed : bool
         Whether a Preisach grid is moved to where its jumps suit the data best.
+    fitted : ndarray of bool, shape (n,), optional
+        Outputs to fit; the memory is carried through the others. Default: all.
 
     Returns
     -------
@@ -72,19 +76,23 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
         raise IdentificationError('the input of an operator does not vary; nothing to identify')
     margin = MARGIN * (high - low)
     low, high = low - margin, high + margin
-    options = {'groups': groups, 'strength': strength, 'strengths': strengths}
+    if fitted is None:
+        fitted = np.ones(len(target), dtype=bool)
+    options: dict[str, Any] = {
+        'groups': groups, 'strength': strength, 'strengths': strengths, 'fitted': fitted}
     if kind == 'preisach':
         nodes = np.linspace(low, high, levels + 1)
         if placed:
-            nodes = _placed(parts, target, nodes, reversible)
+            nodes = _placed(parts, target, nodes, reversible, fitted)
         return fit_preisach(parts, target, nodes, anchor=anchor, reversible=reversible, **options)
     if kind == 'play':
         return _play(parts, target, low, high, levels, options)
     if kind == 'linear':
-        slope, intercept = np.polyfit(np.concatenate([part[1:] for part in parts]), target, 1)
+        inputs = np.concatenate([part[1:] for part in parts])
+        slope, intercept = np.polyfit(inputs[fitted], target[fitted], 1)
         return Linear(float(slope), float(intercept), low, high), None
     if kind == 'bouc-wen':
-        return _bouc_wen(parts, target, low, high), None
+        return fit_bouc_wen(parts, target, low, high, _kept(parts), fitted=fitted), None
     raise IdentificationError(f'no operator of kind {kind!r}')
 
 
@@ -137,13 +145,17 @@ def preisach_rows(nodes: np.ndarray, inputs: np.ndarray, reversible: bool = Fals
     return np.hstack([rows, signed_lengths(nodes, inputs)]) if reversible else rows
 
 
-def fit_preisach(parts, target, nodes, *, groups=None, anchor=None, reversible=True,
-                 strength=None, strengths=None) -> tuple[Preisach, WeightFit]:
+def fit_preisach(parts: Sequence[np.ndarray], target: np.ndarray, nodes: np.ndarray, *,
+                 groups: np.ndarray | None = None, anchor: tuple[float, float] | None = None,
+                 reversible: bool = True, strength: float | None = None,
+                 strengths: Sequence[float] | None = None,
+                 fitted: np.ndarray | slice = slice(None)) -> tuple[Preisach, WeightFit]:
     """Fit a Preisach operator on a given grid; the parameters are those of `fit_operator`."""
-    rows = np.concatenate([preisach_rows(nodes, part, reversible)[1:] for part in parts])
+    rows = np.concatenate([preisach_rows(nodes, part, reversible)[1:] for part in parts])[fitted]
     known = None if anchor is None else Anchor(
         preisach_rows(nodes, np.array([anchor[0]]), reversible)[0], anchor[1])
-    fit = fit_weights(rows, target, groups=groups, scale=_scale(nodes, reversible), sign=1,
+    groups = None if groups is None else groups[fitted]
+    fit = fit_weights(rows, target[fitted], groups=groups, scale=_scale(nodes, reversible), sign=1,
                       strength=strength, strengths=strengths, slack=SLACK,
                       penalty=smoothness(nodes, reversible), anchor=known)
     count = len(cell_areas(nodes))
@@ -151,7 +163,7 @@ def fit_preisach(parts, target, nodes, *, groups=None, anchor=None, reversible=T
                     fit.weights[count:] if reversible else None), fit
 
 
-def _scale(nodes, reversible):
+def _scale(nodes: np.ndarray, reversible: bool) -> np.ndarray:
     """Sizes of the cells, and of the diagonal's intervals."""
     areas = cell_areas(nodes)
     return np.append(areas, np.diff(nodes)) if reversible else areas
@@ -173,16 +185,23 @@ def thinned(drive: np.ndarray, most: int) -> np.ndarray:
     return np.flatnonzero(keep)
 
 
-def _fewer(parts, target):
-    """Return the inputs and outputs that a search looks at, of about `SEARCH_ROWS` rows."""
-    kept = [thinned(part, max(1, SEARCH_ROWS // len(parts))) for part in parts]
+def _kept(parts: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return the rows of each part that a search looks at, about `SEARCH_ROWS` of them."""
+    return [thinned(part, max(1, SEARCH_ROWS // len(parts))) for part in parts]
+
+
+def _fewer(parts: Sequence[np.ndarray], target: np.ndarray,
+           fitted: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+    """Return the inputs and outputs of the rows kept, and which of them are fitted."""
+    kept = _kept(parts)
     # Row n of a part is output n - 1 of its trial.
     starts = np.cumsum([0] + [len(part) - 1 for part in parts[:-1]])
     outputs = np.concatenate([start + rows[1:] - 1 for start, rows in zip(starts, kept)])
-    return [part[rows] for part, rows in zip(parts, kept)], target[outputs]
+    return [part[rows] for part, rows in zip(parts, kept)], target[outputs], fitted[outputs]
 
 
-def _placed(parts, target, nodes, reversible):
+def _placed(parts: Sequence[np.ndarray], target: np.ndarray, nodes: np.ndarray, reversible: bool,
+            fitted: np.ndarray) -> np.ndarray:
     """
     Return the grid, of those reaching a little beyond `nodes`, that fits the rows best.
 
@@ -192,10 +211,12 @@ def _placed(parts, target, nodes, reversible):
     low, high, levels = nodes[0], nodes[-1], len(nodes) - 1
     grids = [np.linspace(low - below * (high - low), high + above * (high - low), levels + 1)
              for below in MARGINS for above in MARGINS]
-    parts, target = _fewer(parts, target)
+    parts, target, fitted = _fewer(parts, target, fitted)
+    target = target[fitted]
     errors, passive = [], None
     for grid in grids:
-        rows = np.concatenate([preisach_rows(grid, part, reversible)[1:] for part in parts])
+        rows = np.concatenate(
+            [preisach_rows(grid, part, reversible)[1:] for part in parts])[fitted]
         root = smoothness(grid, reversible)
         weights, bias, passive = quick_weights(
             rows, target, _scale(grid, reversible), STRENGTHS[0] * root.T @ root, passive)
@@ -203,7 +224,9 @@ def _placed(parts, target, nodes, reversible):
     return grids[int(np.argmin(errors))]
 
 
-def _play(parts, target, low, high, levels, options):
+def _play(parts: Sequence[np.ndarray], target: np.ndarray, low: float, high: float, levels: int,
+          options: dict[str, Any]) -> tuple[HysteresisOperator, WeightFit]:
+    fitted, groups = options.pop('fitted'), options.pop('groups')
     radii = np.linspace(0.0, 0.5 * (high - low), levels + 1)[:-1]
     columns = []
     for radius in radii:
@@ -213,41 +236,9 @@ def _play(parts, target, low, high, levels, options):
             single.reset()
             outputs.append(single.simulate(part)[1:])
         columns.append(np.concatenate(outputs))
-    rows = np.column_stack(columns)
+    rows = np.column_stack(columns)[fitted]
     # A play whose clearance is never taken up contributes nothing.
     scale = np.maximum(np.ptp(rows, axis=0), 1e-12 * (high - low))
-    fit = fit_weights(rows, target, scale=scale, sign=1, slack=SLACK, **options)
-    return PrandtlIshlinskii(radii, fit.weights, fit.bias, low, high), fit
-
-
-def _bouc_wen(parts, target, low, high):
-    """Rate, shape and exponent by search; stiffness, gain and bias by linear least squares."""
-    parts, outputs = _fewer(parts, target)
-    inputs = np.concatenate([part[1:] for part in parts])
-
-    def fit(vector):
-        rate, shape, exponent = _bouc_wen_shape(vector, high - low)
-        states = []
-        for part in parts:
-            unit = BoucWen(0.0, 1.0, rate, shape, exponent, 0.0, low, high)
-            states.append(unit.simulate(part)[1:])
-        rows = np.column_stack([inputs, np.concatenate(states)])
-        scale = np.maximum(np.ptp(rows, axis=0), 1e-12 * (high - low))
-        return fit_weights(rows, outputs, scale=scale, sign=1, strength=1e-9)
-
-    # Slow to fast turning of the hidden state; the shape and the exponent matter less.
-    grid = [np.array([rate, 0.0, 0.0]) for rate in np.linspace(0.0, 5.0, 6)]
-    start = min(grid, key=lambda vector: fit(vector).rmse)
-    found = optimize.minimize(
-        lambda vector: fit(vector).rmse, start, method='Nelder-Mead',
-        options={'initial_simplex': start + np.vstack([np.zeros(3), 0.7 * np.eye(3)]),
-                 'maxfev': 100, 'xatol': 0.01, 'fatol': 0.0})
-    best = fit(found.x)
-    return BoucWen(float(best.weights[0]), float(best.weights[1]),
-                   *_bouc_wen_shape(found.x, high - low), float(best.bias), low, high)
-
-
-def _bouc_wen_shape(vector, span):
-    """Return rate, shape and exponent inside their ranges for any vector of three numbers."""
-    rate, shape, exponent = np.exp(np.clip(vector, -4.0, 6.0))
-    return float(rate / span), 0.5 + float(min(shape, 50.0)), 1.0 + float(min(exponent, 20.0))
+    fit = fit_weights(rows, target[fitted], groups=groups[fitted], scale=scale, sign=1,
+                      slack=SLACK, **options)
+    return PrandtlIshlinskii(radii.tolist(), fit.weights.tolist(), fit.bias, low, high), fit

@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special    # its stats take a second to import
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class WeightFit:
         design = np.column_stack([rows - self.origin, np.ones(len(rows))])[:, self.active]
         spread = np.sum((design @ self.covariance) * design, axis=1)
         freedom = max(1, len(self.residual) - 1)
-        half = (stats.t.ppf(0.5 + 0.5 * level, freedom) * self.noise_std
+        half = (special.stdtrit(freedom, 0.5 + 0.5 * level) * self.noise_std
                 * np.sqrt(1.0 + np.maximum(spread, 0.0)))
         centre = self.predict(rows)
         return centre - half, centre + half

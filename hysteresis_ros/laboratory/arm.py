@@ -8,7 +8,7 @@ arm follows at once unless it has inertia; with friction it sticks until the wir
 """
 
 import collections
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import functools
 import math
 
@@ -58,7 +58,7 @@ class Arm:
         Tension of each different wire [N].
     """
 
-    def __init__(self, conditions: Conditions, seed: int = 0) -> None:
+    def __init__(self, conditions: Conditions, seed: int | Sequence[int] = 0) -> None:
         self.conditions = conditions
         self.muscle = ParallelWires(conditions)
         self._rng = np.random.default_rng(seed)

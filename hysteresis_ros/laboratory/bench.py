@@ -8,7 +8,7 @@ Voltages are held for 30 s, so that Eq. 1 has come to rest within a quarter of a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import TYPE_CHECKING
 
@@ -44,7 +44,7 @@ class Bench:
         Of the sensors' noise and the air's fluctuations.
     """
 
-    def __init__(self, conditions: Conditions, seed: int = 0) -> None:
+    def __init__(self, conditions: Conditions, seed: int | Sequence[int] = 0) -> None:
         self.conditions = conditions
         self._muscle = ParallelWires(conditions)
         self._rng = np.random.default_rng(seed)

@@ -11,13 +11,14 @@ is drawn within 15 % for each specimen. Where `signed`, a negative strength turn
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
-from hysteresis_ros.laboratory.unlisted import UNLISTED
+from hysteresis_ros.laboratory.unlisted import Unlisted, UNLISTED
 
 # Specimens differ in an effect's size by up to this share.
 SPREAD = 0.15
@@ -25,6 +26,9 @@ SPREAD = 0.15
 LOWERED, RAISED = 141.6, 94.2
 # Enthalpy of the transformation [J/kg].
 ENTHALPY = 24e3
+
+# Changes conditions: (conditions, size, specimen, recording).
+Apply = Callable[[Conditions, float, np.random.Generator, np.random.Generator], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +53,7 @@ class Effect:
     """
 
     sentence: str
-    apply: Callable
+    apply: Apply
     signed: bool = False
     bench: bool = False
     listed: bool = True
@@ -106,7 +110,7 @@ def _airflow(conditions: Conditions, size: float, specimen: np.random.Generator,
     conditions.heat.airflow *= factor if size > 0.0 else 1.0 / factor
 
 
-def _change_material(conditions: Conditions, **values: float) -> None:
+def _change_material(conditions: Conditions, **values: Any) -> None:
     conditions.material = dataclasses.replace(conditions.material, **values)
 
 
@@ -171,7 +175,7 @@ def _inertia(conditions: Conditions, size: float, specimen: np.random.Generator,
     conditions.inertia = 0.03 * size
 
 
-def _change_linkage(conditions: Conditions, **values: float) -> None:
+def _change_linkage(conditions: Conditions, **values: Any) -> None:
     conditions.linkage = dataclasses.replace(conditions.linkage, **values)
 
 
@@ -273,7 +277,7 @@ def _disturb(kind: type[Unlisted]) -> Apply:
     return apply
 
 
-EFFECTS = {**LISTED, **{name: Effect(kind.__doc__, _disturb(kind), listed=False)
+EFFECTS = {**LISTED, **{name: Effect(kind.__doc__ or '', _disturb(kind), listed=False)
                         for name, kind in UNLISTED.items()}}
 
 

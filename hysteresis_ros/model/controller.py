@@ -8,7 +8,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize
 
 from hysteresis_ros.bicep.geometry import Reference
 from hysteresis_ros.effects import Inputs
@@ -363,7 +362,8 @@ class Controller:
             return low, at_low > margin
         if at_high <= 0.0:
             return high, at_high < -margin
-        return optimize.brentq(error, low, high, xtol=1e-14, rtol=1e-14), False
+        from scipy.optimize import brentq   # half a second that most models do not need
+        return brentq(error, low, high, xtol=1e-14, rtol=1e-14), False
 
     def _outcome(self, drive, force, load, inputs) -> Outcome:
         """Say what a drive would do; commits nothing."""

@@ -11,6 +11,7 @@ import numpy as np
 from hysteresis_ros.bicep.balance import ArmBalance
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.effects import Effect, Surroundings
+from hysteresis_ros.effects.stages import Statics
 from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.linear import LinearModel
@@ -163,9 +164,16 @@ class MuscleModel:
         from hysteresis_ros.model.observer import Observer
         return Observer(self)
 
-    def balance(self, chain: Chain) -> ArmBalance:
+    def balance(self, chain: Chain, statics: Statics | None = None) -> ArmBalance:
         """
         Return the balance between the muscle, its memory wiped, and the arm.
+
+        Parameters
+        ----------
+        chain : Chain
+            Effects of the model.
+        statics : Statics, optional
+            The arm that the geometry describes at rest, where it was computed before.
 
         Raises
         ------
@@ -183,7 +191,7 @@ class MuscleModel:
             raise ParameterError(
                 f'the model gives {self.response} under {self.load_name}; the bicep needs a '
                 'length table with forces')
-        return ArmBalance(stage, geometry, chain, loaded)
+        return ArmBalance(stage, geometry, chain, loaded, statics)
 
     def require_geometry(self) -> BicepGeometry:
         """Return the arm's geometry; ParameterError if the model has none."""

@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 import copy
 
-from hysteresis_ros.bicep.bundle import Bundle, USUAL_YIELD
+from hysteresis_ros.bicep.bundle import Bundle
 
 # Elongation [m] by which elastic wires may leave the range of the transformation.
 ELASTIC_ROOM = 0.02
@@ -81,9 +81,8 @@ class Muscles:
         if self._bundle is None:
             u = self._sign * (x - load)
             return self._operators[0].peek(u), [u]
-        return self._bundle.settle(
-            lambda output: (output, load), x, self.base - self._room, self._top + self._room,
-            self.base, USUAL_YIELD)
+        return self._bundle.respond(
+            x, load, self.base - self._room, self._top + self._room, self.base)
 
     def step(self, inputs: Sequence) -> None:
         """Commit each muscle's input."""

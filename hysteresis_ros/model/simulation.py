@@ -2,12 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulation of a whole measurement from its inputs alone, trial by trial."""
 
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 import copy
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
-from hysteresis_ros.effects import Inputs, SensorEffect
+from hysteresis_ros.bicep.balance import statics_of
+from hysteresis_ros.effects import Effect, Inputs
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
 
@@ -16,14 +20,8 @@ HOLD = 30.0
 # Passes at most that bring an effect that depends on the phase into agreement with the phase it
 # causes, to this share of martensite, with steps of at least this part of the difference.
 PHASE_PASSES, AGREEMENT, SHORTEST = 10, 2e-3, 0.2
-# The same for an arm in motion, which is balanced in every row.
+# The same for an arm in motion, which takes many more steps.
 MOVING_PASSES = 4
-# True responses that are kept.
-REMEMBERED = 4
-# Step, as a share of the first stage's range, that is a jump.
-JUMP = 0.03
-# Change of that step from one row to the next that is the end of a ramp.
-BEND = 0.003
 
 
 @dataclasses.dataclass
@@ -34,6 +32,20 @@ class Trial:
     drive: np.ndarray
     load: np.ndarray
     inputs: Inputs
+
+
+class Response(NamedTuple):
+    """
+    What the muscle of a trial does, before the sensor.
+
+    `values` (rows,) is the response, `output` (rows,) that of the operator that transforms; on an
+    arm `inputs` (rows,) are those of H2, and `rest` [rad] is the angle before the trial.
+    """
+
+    values: np.ndarray
+    output: np.ndarray
+    inputs: np.ndarray | None = None
+    rest: float | None = None
 
 
 def trials_of(model, measurement) -> list[Trial]:
@@ -96,21 +108,18 @@ class Simulator:
         Operators, geometry and scales; its effects are not looked at.
     measurement : Measurement
         Whose inputs are simulated.
-    stride : int
-        In a continuous arm run only every `stride`-th row of the table is balanced, and every row
-        at which the first stage jumps, bends or turns round, so that the memory stays exact; rows
-        between are interpolated. An arm with inertia or viscous friction is balanced in every row.
     """
 
-    def __init__(self, model, measurement, stride: int = 1):
+    def __init__(self, model, measurement):
         self.model = model
         self.measurement = measurement
-        self.stride = 1 if measurement.settled else stride
         self.trials = trials_of(model, measurement)
-        self._remembered: dict[tuple, tuple] = {}
-        self._rest: float | None = None
+        self._surroundings = model.surroundings
+        self._statics = None
+        if measurement.response == 'angle' and model.geometry is not None:
+            self._statics = statics_of(model.geometry)
 
-    def run(self, effects, inputs_of_stage: list | None = None) -> np.ndarray:
+    def run(self, effects: Sequence[Effect], inputs_of_stage: list | None = None) -> np.ndarray:
         """
         Simulate with these effects.
 
@@ -118,8 +127,7 @@ class Simulator:
         ----------
         effects : sequence of Effect
         inputs_of_stage : list, optional
-            Takes for each trial of an arm run H2's inputs, the rows they belong to, and the
-            trial's number of rows.
+            Takes H2's inputs (rows,) for each trial of an arm run.
 
         Returns
         -------
@@ -131,47 +139,54 @@ class Simulator:
         ParameterError, ModelFileError
             If the model lacks what this kind of measurement needs.
         """
-        chain = Chain(effects, self.model.surroundings)
-        result, rest = self._before_sensor(effects, chain, inputs_of_stage)
-        if chain.sensor:
-            result = result.copy()
-            for trial in self.trials:
-                result[trial.rows] = chain.measured(
-                    result[trial.rows], trial.inputs, rest)
+        chain = Chain(effects, self._surroundings)
+        respond = self._responder(chain)
+        result = np.empty(self.measurement.rows)
+        for trial in self.trials:
+            if chain.needs_phase:
+                response = self._agree(
+                    respond, trial, MOVING_PASSES if chain.moves else PHASE_PASSES)
+            else:
+                response = respond(trial, trial.inputs)
+            result[trial.rows] = chain.measured(response.values, trial.inputs, response.rest)
+            if inputs_of_stage is not None and response.inputs is not None:
+                inputs_of_stage.append(response.inputs)
         return result
 
-    def _before_sensor(self, effects, chain, inputs_of_stage):
+    def run_many(self, sets: Sequence[Sequence[Effect]], jobs: int = 1) -> np.ndarray:
         """
-        Return the true response, and on an arm that of the rest before each trial.
+        Simulate with many sets of effects.
 
-        The last few are remembered, for fits of the sensor.
+        Parameters
+        ----------
+        sets : sequence of sequence of Effect
+        jobs : int
+            Number of threads. They run at the same time, because compiled trials do not hold the
+            interpreter.
+
+        Returns
+        -------
+        ndarray, shape (len(sets), rows)
+            What `run` returns for each set.
+
+        Raises
+        ------
+        ParameterError, ModelFileError
+            As `run`.
         """
-        key = (self.stride, *((effect.id, *effect.values.items()) for effect in effects
-                              if not isinstance(effect, SensorEffect)))
-        if inputs_of_stage is None and key in self._remembered:
-            return self._remembered[key]
-        result = np.empty(self.measurement.rows)
-        respond = self._responder(chain, inputs_of_stage)
-        for number, trial in enumerate(self.trials):
-            if chain.needs_phase:
-                result[trial.rows] = self._agree(
-                    respond, trial, MOVING_PASSES if chain.moves else PHASE_PASSES)
-                if inputs_of_stage is not None:
-                    # Of all passes the last one counts.
-                    del inputs_of_stage[number:-1]
-            else:
-                result[trial.rows], _ = respond(trial, trial.inputs)
-        if len(self._remembered) >= REMEMBERED:
-            del self._remembered[next(iter(self._remembered))]
-        self._remembered[key] = result, self._rest
-        return self._remembered[key]
+        if jobs > 1 and len(sets) > 1:
+            with ThreadPoolExecutor(min(jobs, len(sets))) as pool:
+                rows = list(pool.map(self.run, sets))
+        else:
+            rows = [self.run(effects) for effects in sets]
+        return np.array(rows).reshape(len(sets), self.measurement.rows)
 
-    def _agree(self, respond, trial, passes):
+    def _agree(self, respond: Callable, trial: Trial, passes: int) -> Response:
         """Return the response with the phase that it has itself, by Aitken's relaxation."""
         phase, left, part = np.ones(len(trial.drive)), None, 1.0
         for _ in range(passes):
-            response, given = respond(trial, trial.inputs._replace(phase=phase))
-            before, left = left, self._phase(given) - phase
+            response = respond(trial, trial.inputs._replace(phase=phase))
+            before, left = left, self._phase(response.output) - phase
             if np.sqrt(np.mean(left ** 2)) < AGREEMENT:
                 break
             if before is not None:
@@ -188,8 +203,8 @@ class Simulator:
             return np.clip((high - given) / max(high - low, 1e-12), 0.0, 1.0)
         return self.model.martensite(given)
 
-    def _responder(self, chain, inputs_of_stage):
-        """Return what gives response and operator's output for a trial."""
+    def _responder(self, chain: Chain) -> Callable[[Trial, Inputs], Response]:
+        """Return what gives the response of a trial."""
         response = self.measurement.response
         if response == 'force':
             if self.model.force_stage is None:
@@ -199,11 +214,8 @@ class Simulator:
             return lambda trial, inputs: self._force(chain, operator, trial, inputs)
         first = self.model.first_stage(chain)
         if response == 'angle':
-            balance = self.model.balance(chain)
-
-            def respond(trial, inputs):
-                return self._angle(chain, first, balance, trial, inputs, inputs_of_stage)
-            return respond
+            balance = self.model.balance(chain, self._statics)
+            return lambda trial, inputs: self._angle(chain, first, balance, trial, inputs)
         stage = self.model.require_length_stage()
         return lambda trial, inputs: self._length(chain, first, stage, trial, inputs)
 
@@ -220,7 +232,7 @@ class Simulator:
         operator.reset()
         operator.step(self.model.cold_drive)
         force = operator.simulate(drive)
-        return force, force
+        return Response(force, force)
 
     def _length(self, chain, first, stage, trial, inputs):
         model = self.model
@@ -231,42 +243,14 @@ class Simulator:
         output = stage.simulate(model.sign * (x - load))
         base = stage.output_range[0]
         offset, factor = chain.drift(trial.drive, heat, inputs)
-        return (base + chain.scale(trial.load) * factor * (output - base)
-                + chain.stretch(trial.load) + offset), output
+        return Response(base + chain.scale(trial.load) * factor * (output - base)
+                        + chain.stretch(trial.load) + offset, output)
 
-    def _angle(self, chain, first, balance, trial, inputs, inputs_of_stage):
+    def _angle(self, chain, first, balance, trial, inputs):
         cold, x, heat = self._first(chain, first, trial, inputs)
         offset, factor = chain.drift(trial.drive, heat, inputs)
-        chosen = (np.arange(len(x)) if self.stride == 1 or balance.has_dynamics
-                  else self._chosen_rows(trial.rows.start, cold, x))
-        steps = np.diff(np.cumsum(inputs.step)[chosen], prepend=0.0).tolist()
-        balance.start()
-        self._rest = balance.settle(cold)
-        angles, outputs, stage_inputs = [], [], []
-        for row in zip(x[chosen].tolist(), steps, offset[chosen].tolist(),
-                       factor[chosen].tolist()):
-            angles.append(balance.step(*row))
-            outputs.append(balance.output)
-            stage_inputs.append(balance.operators[0].input)
-        if inputs_of_stage is not None:
-            inputs_of_stage.append((np.array(stage_inputs), chosen, len(x)))
-        if len(chosen) == len(x):
-            return np.array(angles), np.array(outputs)
-        return tuple(np.interp(inputs.time, inputs.time[chosen], column)
-                     for column in (angles, outputs))
-
-    def _chosen_rows(self, start, cold, x):
-        rows = np.arange(len(x))
-        keep = ((start + rows) % self.stride == 0) | turning_rows(x)
-        change = np.abs(np.diff(x, prepend=cold)) / max(np.ptp(x), 1e-12)
-        # A jump is seen from both sides, so that nothing is interpolated over it.
-        jump = change > JUMP
-        keep |= jump
-        keep[:-1] |= jump[1:]
-        # Where a ramp begins or ends, a straight line between the rows beside it would miss it.
-        bend = np.abs(np.diff(x, 2, prepend=[cold, cold])) / max(np.ptp(x), 1e-12)
-        keep[:-1] |= bend[1:] > BEND
-        return rows[keep]
+        rest, angles, outputs, stage_inputs = balance.run(cold, x, inputs.step, offset, factor)
+        return Response(angles, outputs, stage_inputs, rest)
 
 
 def turning_rows(x: np.ndarray) -> np.ndarray:

@@ -6,9 +6,8 @@ from .additive import Additive
 from .areas import signed_areas, signed_lengths
 from .base import HysteresisOperator, Inversion, operator_from_dict
 from .bouc_wen import BoucWen
-from .branch import Branch, PiecewiseQuadratic
-from .cascade import Cascade, linear_drive_model, linear_model
-from .coupled import Coupled, coupled_from_dict
+from .cascade import Cascade
+from .dead_zones import DeadZones
 from .everett import cell_areas, cells
 from .linear import Linear
 from .play import PrandtlIshlinskii
@@ -17,20 +16,15 @@ from .preisach import Preisach
 __all__ = [
     'Additive',
     'BoucWen',
-    'Branch',
     'Cascade',
-    'Coupled',
+    'DeadZones',
     'HysteresisOperator',
     'Inversion',
     'Linear',
-    'PiecewiseQuadratic',
     'PrandtlIshlinskii',
     'Preisach',
     'cell_areas',
     'cells',
-    'coupled_from_dict',
-    'linear_drive_model',
-    'linear_model',
     'operator_from_dict',
     'signed_areas',
     'signed_lengths',

@@ -4,7 +4,7 @@
 What every hysteresis operator is: a scalar input, a scalar output, and a memory.
 
 An operator is rate-independent (Sec. IV of the paper): only the sequence of inputs counts, not
-their times. Committing an input (`step`) changes the memory; asking (`peek`, `branch`, `invert`)
+their times. Committing an input (`step`) changes the memory; asking (`peek`, `invert`)
 never does, so that a controller may try as often as it likes and commit what it applied.
 """
 
@@ -15,7 +15,6 @@ from typing import Any, ClassVar, Mapping, NamedTuple
 import numpy as np
 
 from ..errors import ParameterError
-from .branch import Branch
 
 # Parameters beyond are refused, so that no product of two can overflow.
 LARGEST = 1e100
@@ -132,18 +131,14 @@ class HysteresisOperator(abc.ABC):
         step = self.step
         return np.array([step(value) for value in sequence(u).tolist()])
 
-    @abc.abstractmethod
-    def branch(self, increasing: bool) -> Branch:
-        """Return the monotone branch that the operator follows from its present input."""
-
-    def invert(self, y: float, dead_band: float = 0.0, slope_floor: float = 0.0) -> Inversion:
+    def invert(self, y: float, dead_band: float = 0.0) -> Inversion:
         """
         Find the input nearest to the present one whose output is `y`; commit nothing.
 
         The slope of a hysteresis branch starts at zero, so right after a reversal a small
         change dy of the reference asks for an input change that goes with the root of dy:
-        noise in the reference is amplified without bound. Two options limit this; with both
-        at 0 the inverse is exact.
+        noise in the reference is amplified without bound. A dead band limits this; with 0 the
+        inverse is exact.
 
         Parameters
         ----------
@@ -155,11 +150,6 @@ class HysteresisOperator(abc.ABC):
             not made. Costs an output error of at most `dead_band`, until the reference has
             moved by more. As wide as the noise of the reference from peak to peak it keeps
             the input still; narrower ones leave reversals in. Unit of the output.
-        slope_floor : float
-            The input moves at most by output change over `slope_floor`, so that the gain from
-            reference to input is at most ``1 / slope_floor`` everywhere, plateaus included.
-            What is then missing in the output is made up in the following calls. Unit of
-            the output over the unit of the input.
 
         Returns
         -------
@@ -167,25 +157,19 @@ class HysteresisOperator(abc.ABC):
             Input, the output that it gives, and whether the request was out of reach.
 
         """
-        return Inversion(*self.solve(y, dead_band, slope_floor))
+        return Inversion(*self.solve(y, dead_band))
 
-    def solve(self, y: float, dead_band: float = 0.0,
-              slope_floor: float = 0.0) -> tuple[float, float, bool]:
+    def solve(self, y: float, dead_band: float = 0.0) -> tuple[float, float, bool]:
         """Return what `invert` does as a plain tuple, which is faster inside a control loop."""
         y = float(y)
         if not -math.inf < y < math.inf:
             return self.input, self.output, True
         found = self._solve(y)
-        if dead_band <= 0.0 and slope_floor <= 0.0:
-            return found
-        u, output, saturated = found
-        move = u - self.input
-        if move * self.direction <= 0.0 and abs(y - self.output) <= dead_band:
-            return self.input, self.output, saturated
-        change = abs(output - self.output)
-        if change < slope_floor * abs(move):
-            u = self.input + math.copysign(change / slope_floor, move)
-            return u, self.peek(u), saturated
+        if dead_band > 0.0:
+            u, _, saturated = found
+            reverses = (u - self.input) * self.direction <= 0.0
+            if reverses and abs(y - self.output) <= dead_band:
+                return self.input, self.output, saturated
         return found
 
     @abc.abstractmethod

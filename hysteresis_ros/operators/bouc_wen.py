@@ -8,44 +8,52 @@ the hidden state w in [-1, 1] follows the input u by
 
     dw = rho (du - sigma |du| |w|^(n-1) w + (sigma - 1) du |w|^n)
 
-which knows no time. While the input rises this is dw/du = rho (1 - w^n) for w >= 0 and
-rho (1 + (2 sigma - 1) |w|^n) for w < 0. So rho (u - u0) = G(w) - G(w0) with
+which knows no time. Along a branch it is solved in closed form (`kernels.bouc_wen`), so the result
+does not depend on how finely the input is sampled. The output is bias + S(x) with
 
-    G(w) = w F(1, 1/n; 1 + 1/n; w^n)  or, for w < 0,  w F(1, 1/n; 1 + 1/n; -(2 sigma - 1) |w|^n)
+    x = stiffness * u + gain * w
 
-(F is Gauss's hypergeometric function), and the result does not depend on how finely the input
-is sampled. While it falls the same holds for -w over -u.
+and S a curve of dead zones, without which loops are alike at every level of the input. With a gain
+of the sign of the stiffness the output leads its input, as the force of a spring with friction
+does; with one of the other sign it lags, as the response of an actuator does (T. S. Low and W. Guo,
+J. Microelectromech. Syst. 4 (1995) 230).
 """
 
+import functools
 import math
-from typing import Any, Mapping
+from types import ModuleType
+from typing import Any, Mapping, Sequence
 
 import numpy as np
-from scipy.special import hyp2f1, poch, psi
+from scipy.special import psi
 
 from .base import (
-    HysteresisOperator, LARGEST, input_range, memory, number, one_sign,
-    resolution, take)
-from .branch import Branch
+    HysteresisOperator, LARGEST, input_range, memory, number, resolution, sequence, take)
+from .dead_zones import DeadZones
 from ..errors import ParameterError
 
-# exp(-40) is below the spacing of floats at 1: from there on w is 1.
-_SATURATED = 40.0
-# Where 1 - w^n is smaller, G is summed around its logarithmic pole instead (M. Abramowitz and
-# I. Stegun, Handbook of Mathematical Functions, 15.3.10), which library functions do not do.
-_NEAR_ONE = 1e-4
-_ITERATIONS = 100
+_ITERATIONS = 200
+# By this share the gain of an output that lags may be too large: rounding.
+_ROUNDING = 1e-9
+
+
+@functools.cache
+def _kernel() -> ModuleType:
+    """Return the compiled part, which takes longer to import than all else here."""
+    from ..kernels import bouc_wen
+    return bouc_wen
 
 
 class BoucWen(HysteresisOperator):
     """
-    Bouc-Wen operator: output = bias + stiffness * input + gain * w.
+    Bouc-Wen operator: output = bias + S(stiffness * input + gain * w).
 
     Parameters
     ----------
     stiffness, gain : float
-        Both >= 0 or both <= 0, so that the output is monotone between reversals. Unit of the
-        output over that of the input, and of the output.
+        Of one sign, or, so that the output is monotone between reversals, of two signs with
+        2 * shape * rate * abs(gain) at most abs(stiffness). Unit of the output over that of the
+        input, and of the output.
     rate : float
         rho > 0, in 1 / unit of the input: 1 / rho is the input over which w turns.
     shape : float
@@ -56,6 +64,8 @@ class BoucWen(HysteresisOperator):
         Constant. Unit of the output.
     lower, upper : float
         Input range.
+    thresholds, bends : array_like, shape (L,)
+        Dead zones of S, see `DeadZones`; without them S(x) = x.
 
     Raises
     ------
@@ -67,7 +77,8 @@ class BoucWen(HysteresisOperator):
     kind = 'bouc-wen'
 
     def __init__(self, stiffness: float, gain: float, rate: float, shape: float,
-                 exponent: float, bias: float, lower: float, upper: float) -> None:
+                 exponent: float, bias: float, lower: float, upper: float,
+                 thresholds: Sequence[float] = (), bends: Sequence[float] = ()) -> None:
         where = 'Bouc-Wen operator'
         self.stiffness, self.gain = (
             number(stiffness, f'{where}: stiffness'), number(gain, f'{where}: gain'))
@@ -75,7 +86,7 @@ class BoucWen(HysteresisOperator):
         self.exponent = number(exponent, f'{where}: exponent')
         self.bias = number(bias, f'{where}: bias')
         self.lower, self.upper = input_range(lower, upper, where)
-        self._sign = one_sign(np.array([self.stiffness, self.gain]), f'{where}: stiffness, gain')
+        self.curve = DeadZones(thresholds, bends, where)
         if not 0.0 < self.rate <= LARGEST:
             raise ParameterError(f'{where}: rate is {self.rate}, it has to be above 0')
         if not 0.5 <= self.shape <= 100.0:
@@ -83,10 +94,9 @@ class BoucWen(HysteresisOperator):
                                  'and at most 100')
         if not 1.0 <= self.exponent <= 100.0:
             raise ParameterError(f'{where}: exponent is {self.exponent}, it has to be 1 to 100')
+        self._sign = self._checked_sign(where)
         self._curl = 2.0 * self.shape - 1.0
-        b = 1.0 / self.exponent
-        self._series = [(float(poch(b, k)) / math.factorial(k), float(psi(k + 1.0) - psi(b + k)))
-                        for k in range(4)]
+        self._pole = float(psi(1.0) - psi(1.0 / self.exponent))
         self.reset()
         ends = self.output, self._at(self.upper, 1.0)
         if not max(map(abs, ends)) <= LARGEST:
@@ -94,6 +104,17 @@ class BoucWen(HysteresisOperator):
                                  'unit')
         self._ends = min(ends), max(ends)
         self._tolerance = resolution(self._ends)
+
+    def _checked_sign(self, where: str) -> float:
+        """Return whether the output rises (1.0) or falls (-1.0) with the input."""
+        if self.stiffness * self.gain >= 0.0:
+            return -1.0 if min(self.stiffness, self.gain) < 0.0 else 1.0
+        most = abs(self.stiffness) / (2.0 * self.shape * self.rate)
+        if abs(self.gain) > (1.0 + _ROUNDING) * most:
+            raise ParameterError(
+                f'{where}: stiffness and gain have both signs, and a gain beyond {most:.6g} would '
+                'let the output turn where the input does not')
+        return math.copysign(1.0, self.stiffness)
 
     def reset(self) -> None:
         """Forget the history: the input came down to `lower` from far above, w = -1."""
@@ -104,7 +125,7 @@ class BoucWen(HysteresisOperator):
         self.output = self._at(self.lower, self._w)
 
     def _at(self, u: float, w: float) -> float:
-        return self.bias + self.stiffness * u + self.gain * w
+        return self.bias + self.curve.value(self.stiffness * u + self.gain * w)
 
     @property
     def direction(self) -> float:
@@ -121,67 +142,15 @@ class BoucWen(HysteresisOperator):
         """
         return self._ends
 
-    def _travel(self, w: float, gap: float) -> float:
-        """Return G(w), rho times the input from w = 0 to w while rising; gap = 1 - w > 0."""
-        b = 1.0 / self.exponent
-        if w < 0.0:
-            z = -self._curl * (-w) ** self.exponent
-        else:
-            away = self._pace(w, gap)
-            if away < _NEAR_ONE:
-                logarithm = math.log(away)
-                return w * b * sum(
-                    factor * (shift - logarithm) * away ** k
-                    for k, (factor, shift) in enumerate(self._series))
-            z = 1.0 - away
-        return w * float(hyp2f1(1.0, b, 1.0 + b, z))
-
-    def _pace(self, w: float, gap: float) -> float:
-        """Return dw/du / rho while rising."""
-        if w < 0.0:
-            return 1.0 + self._curl * (-w) ** self.exponent
-        if w < 0.5:
-            return 1.0 - w ** self.exponent
-        return -math.expm1(self.exponent * math.log1p(-gap)) if gap > 0.0 else 0.0
-
     def _slope(self, w: float) -> float:
-        """Return d output / d input while rising, or while falling with -w for w."""
-        return self.stiffness + self.gain * self.rate * self._pace(w, 1.0 - w)
-
-    def _reached(self, travel: float) -> float:
-        """
-        Return w with G(w) = travel.
-
-        Newton's method from the side of 0 over t, w = 1 - exp(-t), respectively over -w: there
-        G is concave, so it approaches the solution from one side and cannot overshoot.
-        """
-        if travel >= _SATURATED:
-            return 1.0
-        place = distance = abs(travel)
-        for _ in range(_ITERATIONS):
-            if travel >= 0.0:
-                w, gap = -math.expm1(-place), math.exp(-place)
-                slope = gap / self._pace(w, gap)
-            else:
-                w, gap = -place, 1.0 + place
-                slope = 1.0 / self._pace(w, gap)
-            change = (distance - abs(self._travel(w, gap))) / slope
-            place += change
-            if place >= _SATURATED:
-                return 1.0
-            if abs(change) <= 1e-15 * place:
-                break
-        return -math.expm1(-place) if travel >= 0.0 else max(-place, -1.0)
+        """Return d x / d input while rising, or while falling with -w for w."""
+        return self.stiffness + self.gain * self.rate * _kernel().pace(
+            w, 1.0 - w, self._curl, self.exponent)
 
     def _turned(self, u: float) -> float:
         """Return w after a movement to an input inside the range."""
-        if u == self.input:
-            return self._w
-        side = 1.0 if u > self.input else -1.0
-        w = side * self._w
-        if w >= 1.0:
-            return self._w
-        return side * self._reached(self._travel(w, 1.0 - w) + self.rate * abs(u - self.input))
+        return _kernel().moved(
+            self._w, self.rate * (u - self.input), self._curl, self.exponent, self._pole)
 
     def step(self, u: float) -> float:
         """Commit an input and return the output."""
@@ -204,36 +173,48 @@ class BoucWen(HysteresisOperator):
         u = min(max(u, self.lower), self.upper)
         return self._at(u, self._turned(u))
 
-    def branch(self, increasing: bool) -> 'BoucWenBranch':
-        """Return the smooth curve from the present input to the end of the range, one way."""
-        return BoucWenBranch(self, increasing)
+    def simulate(self, u: np.ndarray) -> np.ndarray:
+        """Commit a sequence of inputs, shape (M,), and return the outputs, shape (M,)."""
+        u = sequence(u)
+        if len(u) < 3 or not np.all(np.isfinite(u)):
+            return super().simulate(u)
+        inside = np.clip(u, self.lower, self.upper)
+        states = _kernel().follow(inside, self.input, self._w, self.rate, self._curl,
+                                  self.exponent, self._pole)
+        outputs = self.bias + self.curve.values(self.stiffness * inside + self.gain * states)
+        moves = np.sign(np.diff(inside, prepend=self.input))
+        if np.any(moves):
+            self._direction = float(moves[np.flatnonzero(moves)[-1]])
+        self.input, self._w = float(inside[-1]), float(states[-1])
+        self.output = self._at(self.input, self._w)
+        self.saturated = bool(inside[-1] != u[-1])
+        return outputs
 
     def _solve(self, y: float) -> tuple[float, float, bool]:
-        low, high = self._ends
-        saturated = not low - self._tolerance <= y <= high + self._tolerance
-        y = min(max(y, low), high)
         missing = self._sign * (y - self.output)
         if abs(missing) <= self._tolerance:
-            return self.input, self.output, saturated
+            return self.input, self.output, False
         u, output = self._seek(y, self.upper if missing > 0.0 else self.lower)
+        if abs(output - self.output) <= self._tolerance:
+            # On a plateau nothing is gained by a movement.
+            u, output = self.input, self.output
         # What the present branch cannot reach before the end of the range is out of reach.
-        saturated = saturated or abs(output - y) > 10.0 * self._tolerance
-        return u, output, saturated
+        return u, output, abs(output - y) > 10.0 * self._tolerance
 
     def _seek(self, y: float, end: float) -> tuple[float, float]:
         """
         Find the input between the present one and an end whose output is y, or comes nearest.
 
-        Away from the present input the slope never grows, so Newton's method stays on the near
-        side of the solution; halving guards against rounding.
+        Along a branch the slope of x over the input only falls, or only grows where the output
+        lags, so Newton's method comes from one side; halving guards the rest.
         """
         side = 1.0 if end > self.input else -1.0
         output = self.peek(end)
         if self._sign * side * (y - output) >= 0.0:
             return end, output
         near, far = self.input, end
-        u, output = near, self.output
-        w = self._w
+        wanted = self.curve.inverse(y - self.bias)
+        u, w, output = near, self._w, self.output
         for _ in range(_ITERATIONS):
             error = y - output
             if abs(error) <= 0.1 * self._tolerance:
@@ -243,7 +224,8 @@ class BoucWen(HysteresisOperator):
             else:
                 far = u
             slope = self._slope(side * w)
-            u = u + error / slope if slope != 0.0 else far
+            missing = wanted - (self.stiffness * u + self.gain * w)
+            u = u + missing / slope if slope != 0.0 else far
             if not min(near, far) < u < max(near, far):
                 u = near + (far - near) / 2.0
                 if u in (near, far):
@@ -271,64 +253,14 @@ class BoucWen(HysteresisOperator):
         """Return kind and parameters as plain types, without the memory; floats are exact."""
         return {'kind': self.kind, 'stiffness': self.stiffness, 'gain': self.gain,
                 'rate': self.rate, 'shape': self.shape, 'exponent': self.exponent,
-                'bias': self.bias, 'lower': self.lower, 'upper': self.upper}
+                'bias': self.bias, 'lower': self.lower, 'upper': self.upper,
+                'thresholds': self.curve.thresholds.tolist(),
+                'bends': self.curve.bends.tolist()}
 
     @classmethod
     def from_dict(cls, parameters: Mapping[str, Any]) -> 'BoucWen':
         """Build the operator from what `to_dict` returned; ParameterError if it cannot be."""
         names = ('stiffness', 'gain', 'rate', 'shape', 'exponent', 'bias', 'lower', 'upper')
-        return cls(*(take(parameters, name, 'Bouc-Wen operator') for name in names))
-
-
-class BoucWenBranch(Branch):
-    """
-    The branch of a Bouc-Wen operator from its memory at the time of the call.
-
-    Parameters
-    ----------
-    operator : BoucWen
-        The operator; its later steps do not change the branch.
-    increasing : bool
-        Whether the input moves up along the branch.
-
-    """
-
-    def __init__(self, operator: BoucWen, increasing: bool) -> None:
-        # A copy of its own, because the operator goes on.
-        self._operator = BoucWen.from_dict(operator.to_dict())
-        self._operator.restore(operator.save())
-        ends = ((operator.input, operator.upper) if increasing
-                else (operator.lower, operator.input))
-        self.knots = np.unique(ends)
-        self.values = np.array([self._operator.peek(u) for u in self.knots])
-        self.increasing = increasing
-
-    def value(self, u: np.ndarray | float) -> np.ndarray | float:
-        """Return the output at inputs; beyond the ends of the branch, that of the nearer end."""
-        u = np.clip(np.asarray(u, dtype=float), self.knots[0], self.knots[-1])
-        return np.vectorize(self._operator.peek, otypes=[float])(u)[()]
-
-    def slope(self, u: np.ndarray | float) -> np.ndarray | float:
-        """Return d output / d input."""
-        operator = self._operator
-        side = 1.0 if self.increasing else -1.0
-
-        def scalar(place: float) -> float:
-            return operator._slope(side * operator._turned(place))
-
-        u = np.clip(np.asarray(u, dtype=float), self.knots[0], self.knots[-1])
-        return np.vectorize(scalar, otypes=[float])(u)[()]
-
-    def inverse(self, y: np.ndarray | float) -> np.ndarray | float:
-        """Return the inputs nearest to the present one that give outputs, or come nearest."""
-        operator = self._operator
-        end = float(self.knots[-1] if self.increasing else self.knots[0])
-        start = operator.output
-        side = operator._sign if self.increasing else -operator._sign
-
-        def scalar(level: float) -> float:
-            if side * (level - start) <= 0.0 or end == operator.input:
-                return operator.input
-            return operator._seek(level, end)[0]
-
-        return np.vectorize(scalar, otypes=[float])(np.asarray(y, dtype=float))[()]
+        # Files written before there were dead zones do not name them.
+        return cls(*(take(parameters, name, 'Bouc-Wen operator') for name in names),
+                   parameters.get('thresholds', ()), parameters.get('bends', ()))

@@ -10,23 +10,17 @@ modified operator of K. Kuhnen, Eur. J. Control 9 (2003) 407) make them asymmetr
 saturate. Sum and dead zones are piecewise linear along a branch, so the inverse is exact.
 """
 
-import math
 from typing import Any, Mapping, Sequence
 
 import numpy as np
 
-from .base import (
-    HysteresisOperator, LARGEST, input_range, memory, number, numbers,
-    one_sign, resolution, sequence, take)
-from .branch import PiecewiseQuadratic
-from .staircase import monotone_runs
+from .base import LARGEST, input_range, memory, number, numbers, one_sign, resolution, take
+from .compiled import CompiledOperator
 from ..errors import ParameterError
-
-# Monotone runs of fewer inputs than this are stepped through: arrays cost more to set up.
-_WORTH_AN_ARRAY = 20
+from ..kernels import layout, play as kernel
 
 
-class PrandtlIshlinskii(HysteresisOperator):
+class PrandtlIshlinskii(CompiledOperator):
     """
     Weighted play operators, optionally followed by one-sided dead zones.
 
@@ -71,7 +65,7 @@ class PrandtlIshlinskii(HysteresisOperator):
         if len(self.weights) != len(self.radii):
             raise ParameterError(f'{where}: {len(self.weights)} weights for '
                                  f'{len(self.radii)} radii')
-        self._sign = one_sign(self.weights, f'{where}: weights')
+        sign = one_sign(self.weights, f'{where}: weights')
         if np.any(np.diff(self.thresholds) <= 0.0) or len(self.bends) != len(self.thresholds):
             raise ParameterError(f'{where}: thresholds have to be strictly increasing, with one '
                                  'bend each')
@@ -82,182 +76,26 @@ class PrandtlIshlinskii(HysteresisOperator):
         for array in (self.radii, self.weights, self.thresholds, self.bends):
             array.flags.writeable = False
 
-        self._plays_of = list(zip(self.radii.tolist(), self.weights.tolist()))
-        self._gains = np.concatenate(([1.0], gains))
-        self._curve = list(zip(self.thresholds.tolist(), self.bends.tolist()))
         # The outputs at the thresholds; the inverse of the dead zones searches among them.
-        self._bent = self._shape(self.thresholds)
+        over = np.maximum(self.thresholds[:, None] - self.thresholds, 0.0)
+        bent = self.bias + self.thresholds + np.sum(self.bends * over, axis=-1)
+        self.table = np.concatenate((
+            [layout.PLAY, self.lower, self.upper, sign, 0.0, 0.0, 0.0, len(self.radii),
+             len(self.bends), self.bias],
+            self.radii, self.weights, self.thresholds, self.bends, bent, gains))
+        self.memory = np.empty(layout.MEMORY + len(self.radii))
         self.reset()
-        ends = self._limits()
+        ends = self.peek(self.lower), self.peek(self.upper)
         if not max(map(abs, ends)) <= LARGEST:
             raise ParameterError(f'{where}: the output reaches beyond {LARGEST:g}, use another '
                                  'unit')
-        self._ends = min(ends), max(ends)
-        self._tolerance = resolution(self._ends)
-
-    def _limits(self) -> tuple[float, float]:
-        """Return the outputs at both ends of the input range."""
-        return self.peek(self.lower), self.peek(self.upper)
-
-    def reset(self) -> None:
-        """Forget the history: the input came down to `lower` from far above."""
-        self._plays = (self.lower + self.radii).tolist()
-        self._direction = 0.0
-        self.input = self.lower
-        self.saturated = False
-        self.output = self._bend(self._sum(self._plays))
-
-    @property
-    def direction(self) -> float:
-        """The last movement of the input: 1.0 up, -1.0 down, 0.0 if there was none."""
-        return self._direction
-
-    @property
-    def output_range(self) -> tuple[float, float]:
-        """Smallest and largest output: those at the ends of the input range."""
-        return self._ends
-
-    def _moved(self, u: float) -> list[float]:
-        """Return the places of the plays after a movement to an input inside the range."""
-        return [u - r if p < u - r else u + r if p > u + r else p
-                for p, (r, _) in zip(self._plays, self._plays_of)]
-
-    def _sum(self, plays: list[float]) -> float:
-        """Return the weighted sum x of plays."""
-        x = 0.0
-        for p, (_, w) in zip(plays, self._plays_of):
-            x += w * p
-        return x
-
-    def _bend(self, x: float) -> float:
-        """Return the output for a weighted sum."""
-        y = self.bias + x
-        for threshold, bend in self._curve:
-            if x <= threshold:
-                break
-            y += bend * (x - threshold)
-        return y
-
-    def _shape(self, x: np.ndarray) -> np.ndarray:
-        """Return the outputs for an array of weighted sums."""
-        over = np.maximum(x[..., None] - self.thresholds, 0.0)
-        return self.bias + x + np.sum(self.bends * over, axis=-1)
-
-    def _unbend(self, y: float) -> float:
-        """Return the weighted sum that gives an output."""
-        k = int(np.searchsorted(self._bent, y))
-        if k == 0:
-            return y - self.bias
-        return float(self.thresholds[k - 1] + (y - self._bent[k - 1]) / self._gains[k])
-
-    def step(self, u: float) -> float:
-        """Commit an input and return the output."""
-        u = float(u)
-        self.saturated = not self.lower <= u <= self.upper
-        if not math.isnan(u):
-            u = min(max(u, self.lower), self.upper)
-            if u != self.input:
-                self._direction = 1.0 if u > self.input else -1.0
-            self.input = u
-            self._plays = plays = self._moved(u)
-            self.output = self._bend(self._sum(plays))
-        return self.output
-
-    def peek(self, u: float) -> float:
-        """Return the output that `step` would give, and commit nothing."""
-        u = float(u)
-        if math.isnan(u):
-            return self.output
-        return self._bend(self._sum(self._moved(min(max(u, self.lower), self.upper))))
-
-    def simulate(self, u: np.ndarray) -> np.ndarray:
-        """
-        Commit a sequence of inputs, shape (M,), and return the outputs, shape (M,).
-
-        Long monotone runs are evaluated as arrays, short ones step by step.
-        """
-        u = sequence(u)
-        if not np.all(np.isfinite(u)):
-            return super().simulate(u)
-        outputs = np.empty(len(u))
-        inside = np.clip(u, self.lower, self.upper)
-        for start, stop, rising in monotone_runs(inside, self.input):
-            # The last input of a run is a scalar step in any case: that keeps the memory.
-            if stop - start > _WORTH_AN_ARRAY:
-                outputs[start:stop - 1] = self._shape(
-                    self._along(inside[start:stop - 1], rising))
-                start = stop - 1
-            for n in range(start, stop):
-                outputs[n] = self.step(float(u[n]))
-        return outputs
-
-    def _along(self, u: np.ndarray, increasing: bool) -> np.ndarray:
-        """Return the weighted sums of a monotone run of inputs that starts at the present one."""
-        u = u[:, None]
-        plays = (np.maximum(self._plays, u - self.radii) if increasing
-                 else np.minimum(self._plays, u + self.radii))
-        return plays @ self.weights
-
-    def _starts(self, increasing: bool) -> list[float]:
-        """
-        Return the inputs at which the plays begin to move, the smallest radius first.
-
-        Neighbouring plays are never further apart than their radii, so these are in the order
-        in which the input meets them.
-        """
-        here = self.input
-        if increasing:
-            return [max(p + r, here) for p, (r, _) in zip(self._plays, self._plays_of)]
-        return [min(p - r, here) for p, (r, _) in zip(self._plays, self._plays_of)]
-
-    def branch(self, increasing: bool) -> PiecewiseQuadratic:
-        """
-        Return the branch from the present input to the end of the range, one way.
-
-        Its knots are where a play begins to move and where the sum passes a threshold.
-        """
-        ends = (self.input, self.upper) if increasing else (self.lower, self.input)
-        knots = np.unique(np.clip([*ends, *self._starts(increasing)], *ends))
-        sums = self._along(knots, increasing)
-        if len(knots) > 1 and len(self.thresholds):
-            order = slice(None) if sums[-1] >= sums[0] else slice(None, None, -1)
-            inside = ((self.thresholds > min(sums[0], sums[-1]))
-                      & (self.thresholds < max(sums[0], sums[-1])))
-            extra = np.interp(self.thresholds[inside], sums[order], knots[order])
-            knots = np.unique(np.concatenate((knots, extra)))
-            sums = self._along(knots, increasing)
-        values = self._shape(sums)
-        slopes = np.diff(values) / np.diff(knots)
-        return PiecewiseQuadratic(knots, values, slopes, np.zeros_like(slopes), increasing)
-
-    def _solve(self, y: float) -> tuple[float, float, bool]:
-        low, high = self._ends
-        saturated = not low - self._tolerance <= y <= high + self._tolerance
-        y = min(max(y, low), high)
-        if abs(y - self.output) <= self._tolerance:
-            return self.input, self.output, saturated
-        missing = self._sign * (self._unbend(y) - self._sum(self._plays))
-        increasing = missing > 0.0
-        missing = abs(missing)
-        end = self.upper if increasing else self.lower
-        starts = [*self._starts(increasing), end]
-        found, slope = end, 0.0
-        for k, (_, weight) in enumerate(self._plays_of):
-            start, following = starts[k], starts[k + 1]
-            slope += abs(weight)
-            rise = slope * abs(following - start)
-            if missing <= rise + self._tolerance:
-                d = min(missing / slope, abs(following - start)) if slope > 0.0 else 0.0
-                found = start + d if increasing else start - d
-                break
-            missing -= rise
-        found = min(max(found, self.lower), self.upper)
-        return found, self.peek(found), saturated
+        low, high = min(ends), max(ends)
+        self.table[[layout.LOW, layout.HIGH, layout.TOLERANCE]] = low, high, resolution((low, high))
 
     def save(self) -> dict[str, Any]:
         """Return the memory: the present input and the places of the plays."""
         return {'kind': self.kind, 'input': self.input, 'saturated': self.saturated,
-                'direction': self._direction, 'plays': list(self._plays)}
+                'direction': self.direction, 'plays': self.memory[layout.MEMORY:].tolist()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take over what `save` returned; ParameterError if it is something else."""
@@ -269,9 +107,9 @@ class PrandtlIshlinskii(HysteresisOperator):
                 or np.any(np.abs(np.diff(plays)) > np.diff(self.radii) + slack)):
             raise ParameterError(f'{where}: the plays are not where this input could have '
                                  'left them')
-        self.input, self.saturated, self._direction = u, saturated, direction
-        self._plays = plays.tolist()
-        self.output = self._bend(self._sum(self._plays))
+        self.memory[layout.MEMORY:] = plays
+        output = kernel.bend(self.table, kernel.total(self.table, self.memory, u))
+        self.memory[:layout.MEMORY] = u, output, saturated, direction
 
     def to_dict(self) -> dict[str, Any]:
         """Return kind and parameters as plain types, without the memory; floats are exact."""

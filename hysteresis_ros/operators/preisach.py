@@ -7,6 +7,7 @@ The relays that are up fill the Preisach plane below a staircase whose corners a
 of the input that nothing has wiped out since. The output moves with the weight between the last
 corner and the present input (`everett`), so one stack of corners with the sums up to each of
 them is the whole memory, and a step costs amortised constant time however long the history is.
+The steps themselves are compiled: `kernels.preisach`.
 """
 
 import copy
@@ -15,19 +16,15 @@ from typing import Any, Mapping
 import numpy as np
 
 from ..errors import ParameterError
+from ..kernels import layout, preisach as kernel
 from .areas import signed_areas
-from .base import (
-    HysteresisOperator, LARGEST, memory, number, numbers, one_sign, resolution,
-    sequence, take)
-from .branch import PiecewiseQuadratic
-from .everett import Everett, check_nodes
-from .staircase import MOST_CORNERS, beyond, check_corners, monotone_runs, thin
-
-# Monotone runs of fewer inputs than this are stepped through: arrays cost more to set up.
-_WORTH_AN_ARRAY = 50
+from .base import LARGEST, memory, number, numbers, one_sign, resolution, take
+from .compiled import CompiledOperator
+from .everett import check_nodes, everett_table
+from .staircase import MOST_CORNERS, check_corners
 
 
-class Preisach(HysteresisOperator):
+class Preisach(CompiledOperator):
     """
     Preisach operator with a piecewise constant weight of one sign.
 
@@ -74,22 +71,28 @@ class Preisach(HysteresisOperator):
         self.lower, self.upper = float(self.nodes[0]), float(self.nodes[-1])
         self._sign = one_sign(
             np.concatenate((self.weights, self.reversible)), 'Preisach weights')
-        # The output is base + sign * z with z from 0, all relays down, to span, all up.
-        self._take(Everett(
-            self.nodes, 2.0 * np.abs(self.weights), 2.0 * np.abs(self.reversible)))
+        self._tilted: dict[float, np.ndarray] = {}
+        self.table = self._packed(self.reversible)
+        self.memory = np.empty(kernel.memory_size(MOST_CORNERS))
+        self.reset()
         for array in (self.nodes, self.weights, self.reversible):
             array.flags.writeable = False
 
-    def _take(self, everett: Everett) -> None:
-        """Take the weight as a function, and wipe the memory."""
-        self._everett = everett
-        self._span = everett.total
-        self._base = self.bias - self._sign * self._span / 2.0
-        if not self._span + abs(self._base) <= LARGEST:
+    def _packed(self, reversible: np.ndarray) -> np.ndarray:
+        """Return the table of parameters with given weights on the diagonal."""
+        # The output is base + sign * z with z from 0, all relays down, to span, all up.
+        everett, span = everett_table(
+            self.nodes, 2.0 * np.abs(self.weights), 2.0 * np.abs(reversible))
+        base = self.bias - self._sign * span / 2.0
+        if not span + abs(base) <= LARGEST:
             raise ParameterError(
                 f'Preisach operator: the output reaches beyond {LARGEST:g}, use another unit')
-        self._tolerance = resolution(self.output_range)
-        self.reset()
+        low, high = sorted((base, base + self._sign * span))
+        levels = len(self.nodes) - 1
+        return np.concatenate((
+            [layout.PREISACH, self.lower, self.upper, self._sign, low, high,
+             resolution((low, high)), levels, base, span, levels / (self.upper - self.lower)],
+            everett))
 
     def tilted(self, slope: float) -> 'Preisach':
         """
@@ -102,263 +105,44 @@ class Preisach(HysteresisOperator):
             over the unit of the input.
 
         """
-        other = copy.copy(self)
+        other = copy.deepcopy(self)
         other.reversible = self.reversible + 0.5 * self._sign * slope
         other.reversible.flags.writeable = False
-        other._take(self._everett.tilted(slope))
+        table = self._tilted.get(slope)
+        if table is None:
+            # The table costs as much as hundreds of steps, and the slope seldom changes.
+            table = self._packed(other.reversible)
+            self._tilted.clear()
+            self._tilted[slope] = table
+        other.table, other._tilted = table, {}
+        other.reset()
         return other
 
-    def reset(self) -> None:
-        """Forget the history: all relays down, input at `lower`."""
-        # The stack starts with upper and lower as if the input had come down from saturation:
-        # entries alternate maximum, minimum; an even count means that the input rises.
-        self._corners = [self.upper, self.lower]
-        self._sums = [self._span, 0.0]
-        self._commit(self.lower, 0.0, False)
+    def _used(self) -> int:
+        return kernel.CORNERS + 2 * int(self.memory[kernel.COUNT])
 
-    def _commit(self, u: float, z: float, saturated: bool) -> None:
-        self.input = u
-        self._z = z
-        self.output = self._base + self._sign * z
-        self.saturated = saturated
+    @property
+    def _corners(self) -> list[float]:
+        """The whole staircase, outside in, beginning with the ends of the range."""
+        return self.memory[kernel.CORNERS:self._used():2].tolist()
 
     @property
     def direction(self) -> float:
         """The last movement of the input: 1.0 up, -1.0 down, 0.0 if there was none."""
-        if self.input == self._corners[-1]:
+        count = int(self.memory[kernel.COUNT])
+        if self.input == self.memory[kernel.CORNERS + 2 * (count - 1)]:
             return 0.0
-        return -1.0 if len(self._corners) & 1 else 1.0
+        return -1.0 if count & 1 else 1.0
 
     @property
     def corners(self) -> list[float]:
         """Reversals that the memory holds: maximum, minimum, maximum, ... outside in."""
         return self._corners[2:]
 
-    @property
-    def output_range(self) -> tuple[float, float]:
-        """Smallest and largest output: all relays down and all up."""
-        ends = self._base, self._base + self._sign * self._span
-        return min(ends), max(ends)
-
-    def step(self, u: float) -> float:
-        """
-        Commit an input and return the output.
-
-        Amortised constant time. An input outside the grid counts as the nearer end; NaN leaves
-        the memory as it is. Both set `saturated`.
-        """
-        u = float(u)
-        if self.lower < u < self.upper:
-            z, depth, turned = self._trace(u)
-            corners, sums = self._corners, self._sums
-            if depth < len(corners):
-                del corners[depth:], sums[depth:]
-            if turned:
-                corners.append(self.input)
-                sums.append(self._z)
-                if len(corners) > MOST_CORNERS:
-                    thin(corners, sums, self._everett)
-            self.input = u
-            self._z = z
-            self.saturated = False
-            self.output = y = self._base + self._sign * z
-            return y
-        if u >= self.upper:
-            del self._corners[2:], self._sums[2:]
-            self._commit(self.upper, self._span, u > self.upper)
-        elif u <= self.lower:
-            self.reset()
-            self.saturated = u < self.lower
-        else:
-            self.saturated = True
-        return self.output
-
-    def peek(self, u: float) -> float:
-        """Return the output that `step` would give, and commit nothing."""
-        u = float(u)
-        if self.lower < u < self.upper:
-            return self._base + self._sign * self._trace(u)[0]
-        if u >= self.upper:
-            return self._base + self._sign * self._span
-        return self._base if u <= self.lower else self.output
-
-    def _trace(self, u: float) -> tuple[float, int, bool]:
-        """
-        Follow the memory to an input strictly inside the range.
-
-        Returns
-        -------
-        z : float
-            Level there.
-        depth : int
-            Number of corners that survive.
-        turned : bool
-            Whether the present input becomes a corner on top of them.
-
-        """
-        corners = self._corners
-        depth = len(corners)
-        here = self.input
-        if depth & 1:
-            if u <= here:
-                if u <= corners[depth - 2]:
-                    depth = beyond(corners, depth, u, False)
-                top = depth - 1
-                return self._sums[top] - self._everett.at(corners[top], u), depth, False
-            if u < corners[depth - 1]:
-                return self._z + self._everett.at(u, here), depth, True
-            depth = beyond(corners, depth + 1, u, True)
-            top = depth - 1
-            return self._sums[top] + self._everett.at(u, corners[top]), depth, False
-        if u >= here:
-            if u >= corners[depth - 2]:
-                depth = beyond(corners, depth, u, True)
-            top = depth - 1
-            return self._sums[top] + self._everett.at(u, corners[top]), depth, False
-        if u > corners[depth - 1]:
-            return self._z - self._everett.at(here, u), depth, True
-        depth = beyond(corners, depth + 1, u, False)
-        top = depth - 1
-        return self._sums[top] - self._everett.at(corners[top], u), depth, False
-
-    def simulate(self, u: np.ndarray) -> np.ndarray:
-        """
-        Commit a sequence of inputs and return the outputs.
-
-        Long monotone runs are evaluated as arrays, short ones step by step.
-
-        Parameters
-        ----------
-        u : ndarray, shape (M,)
-            Inputs, taken after those committed so far.
-
-        Returns
-        -------
-        ndarray, shape (M,)
-            The outputs of M calls of `step`, to 1e-12 of full scale.
-
-        """
-        u = sequence(u)
-        if not np.all(np.isfinite(u)):
-            return super().simulate(u)
-        outputs = np.empty(len(u))
-        inside = np.clip(u, self.lower, self.upper)
-        for start, stop, rising in monotone_runs(inside, self.input):
-            # The last input of a run is a scalar step in any case: that keeps the memory.
-            if stop - start > _WORTH_AN_ARRAY:
-                outputs[start:stop - 1] = self._along(inside[start:stop - 1], rising)
-                start = stop - 1
-            for n in range(start, stop):
-                outputs[n] = self.step(float(u[n]))
-        return outputs
-
-    def _along(self, u: np.ndarray, increasing: bool) -> np.ndarray:
-        """Return the outputs of a monotone run of inputs that starts at the present one."""
-        bases, levels, thresholds = self._ladder(increasing)
-        k = np.searchsorted(thresholds, u if increasing else -u, side='right')
-        if increasing:
-            z = levels[k] + self._everett.value(u, bases[k])
-        else:
-            z = levels[k] - self._everett.value(bases[k], u)
-        return self._base + self._sign * z
-
-    def _ladder(self, increasing: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """
-        Return the corners that a monotone run starts from, one after the other.
-
-        Returns
-        -------
-        bases, levels : ndarray, shape (K,)
-            Corner and level from which each part of the branch is measured.
-        thresholds : ndarray, shape (K - 1,)
-            Inputs, negated on the way down so that they ascend, at which the next part begins.
-
-        """
-        corners, sums = self._corners, self._sums
-        top = len(corners) - 1
-        bases, levels = [], []
-        if bool(top & 1) == increasing:
-            wipers = corners[top - 1:0 if increasing else 1:-2]
-        else:
-            # The input turns and makes a corner of its own.
-            bases.append(self.input)
-            levels.append(self._z)
-            wipers = corners[top:0 if increasing else 1:-2]
-            top -= 1
-        bases += corners[top:0:-2]
-        levels += sums[top:0:-2]
-        thresholds = np.array(wipers, dtype=float)
-        return np.array(bases), np.array(levels), thresholds if increasing else -thresholds
-
-    def branch(self, increasing: bool) -> PiecewiseQuadratic:
-        """
-        Return the branch from the present input to the end of the range, one way.
-
-        Its knots are the grid's nodes and the corners that the input wipes out on the way.
-        """
-        bases, levels, thresholds = self._ladder(increasing)
-        marks = thresholds if increasing else -thresholds
-        knots = np.unique(np.concatenate((self.nodes, marks, [self.input])))
-        if increasing:
-            knots = knots[knots >= self.input]
-        else:
-            knots = knots[knots <= self.input]
-        values = self._along(knots, increasing)
-        # Each piece belongs to the corner that its middle is measured from.
-        middle = knots[:-1] + np.diff(knots) / 2.0
-        k = np.searchsorted(thresholds, middle if increasing else -middle, side='right')
-        if increasing:
-            slopes, bends = self._everett.rise(knots[:-1], bases[k])
-        else:
-            slopes, bends = self._everett.fall(bases[k], knots[:-1])
-            bends = -bends
-        return PiecewiseQuadratic(
-            knots, values, self._sign * slopes, self._sign * bends, increasing)
-
-    def _solve(self, y: float) -> tuple[float, float, bool]:
-        sign, base, tolerance = self._sign, self._base, self._tolerance
-        target = sign * (y - base)
-        saturated = False
-        if target < 0.0:
-            saturated = target < -tolerance
-            target = 0.0
-        elif target > self._span:
-            saturated = target > self._span + tolerance
-            target = self._span
-        change = target - self._z
-        if -tolerance <= change <= tolerance:
-            return self.input, self.output, saturated
-
-        # Find the corner that the branch is measured from where it meets the target, and the
-        # two corners between which it is measured from that one.
-        corners, sums = self._corners, self._sums
-        up = change > 0.0
-        held = len(corners)
-        # If the input has to turn, it makes a corner of its own on top of the others.
-        depth = held + 1 if bool(held & 1) == up else held
-        depth = beyond(sums, depth, target - tolerance if up else target + tolerance, up)
-        if depth > held:
-            corner, level = self.input, self._z
-        else:
-            corner, level = corners[depth - 1], sums[depth - 1]
-        passed = corners[depth] if depth < held else self.input
-        coming = corners[depth - 2]
-        if up:
-            u, rise = self._everett.alpha(target - level, corner, tolerance)
-            if not passed <= u <= coming:
-                u = min(max(u, passed), coming)
-                rise = self._everett.at(u, corner)
-            return u, base + sign * (level + rise), saturated
-        u, fall = self._everett.beta(level - target, corner, tolerance)
-        if not coming <= u <= passed:
-            u = max(min(u, passed), coming)
-            fall = self._everett.at(corner, u)
-        return u, base + sign * (level - fall), saturated
-
     def save(self) -> dict[str, Any]:
         """Return the memory: the present input and the corners, outside in."""
         return {'kind': self.kind, 'input': self.input, 'saturated': self.saturated,
-                'corners': self._corners[2:]}
+                'corners': self.corners}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """
@@ -373,20 +157,10 @@ class Preisach(HysteresisOperator):
         u, saturated, where = memory(state, self)
         corners = numbers(take(state, 'corners', where), f'{where}: corners').tolist()
         corners = check_corners(corners, u, self.lower, self.upper, where)
-        sums = [self._span, 0.0]
-        for k in range(2, len(corners)):
-            sums.append(self._level(corners, sums, k, corners[k]))
-        self._corners, self._sums = corners, sums
-        self._commit(u, self._level(corners, sums, len(corners), u), saturated)
-
-    def _level(self, corners: list[float], sums: list[float], depth: int, u: float) -> float:
-        """Return the level at an input measured from the corner below a given depth."""
-        if u >= self.upper:
-            return self._span
-        top = depth - 1
-        if top & 1:
-            return sums[top] + self._everett.at(u, corners[top])
-        return sums[top] - self._everett.at(corners[top], u)
+        self.memory[kernel.CORNERS:kernel.CORNERS + 2 * len(corners):2] = corners
+        self.memory[kernel.COUNT] = len(corners)
+        kernel.recall(self.table, self.memory, u)
+        self.memory[layout.SATURATED] = saturated
 
     def areas(self, inputs: np.ndarray) -> np.ndarray:
         """Return the signed areas after inputs from the cold state, shape (M, cells)."""

@@ -34,7 +34,8 @@ class Serial(SerialBase):
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        self.simulation = None
+        self.simulation: SimulatedPort | None = None
+        self.is_open = False
         super().__init__(*args, **kwargs)
 
     def open(self) -> None:
@@ -86,10 +87,10 @@ class Serial(SerialBase):
             If the port is closed or the simulated cable is pulled.
 
         """
-        data = to_bytes(data)
+        content = bytes(to_bytes(data))
         with self._opened() as port:
-            port.write(data)
-        return len(data)
+            port.write(content)
+        return len(content)
 
     def cancel_read(self) -> None:
         """Let a waiting `read` return with what it has."""
@@ -119,7 +120,7 @@ class Serial(SerialBase):
         """Throw away what has not been sent: nothing."""
 
     @contextlib.contextmanager
-    def _opened(self) -> SimulatedPort:
+    def _opened(self) -> Iterator[SimulatedPort]:
         if self.simulation is None:
             raise PortNotOpenError()
         with _pyserial_errors():

@@ -69,7 +69,8 @@ class SimulatedPort:
         self._speed = simulation.speed
         self._origin = clock()  # wall time at which the arm's time was, or would have been, 0
         self._ticks = 0
-        self._outbox = collections.deque()      # what the host wrote, on its way to the board
+        # What the host wrote, on its way to the board.
+        self._outbox: collections.deque[bytes] = collections.deque()
         self._changed = threading.Condition()
         self._cancelled = False
 

@@ -91,7 +91,7 @@ class SimulatedBoard:
         self.time = 0
         self.duty = 0.0
         self.enabled = False
-        self.faults = set()
+        self.faults: set[str] = set()
         self._decoder = Decoder()
         self._sequence = 0
         self._period = PERIOD
@@ -100,12 +100,12 @@ class SimulatedBoard:
         self._next_ambient = 0
         self._next_remark = 0
         self._last_set = 0
-        self._accepted = None
+        self._accepted: int | None = None
         self._counter_zero = self._last_counts = self.arm.encoder_counts
         if self._boot == 1:
             self._counter_zero = 0      # the encoder was set to zero when the arm was built
         self._index = 0
-        self._latch = None
+        self._latch: int | None = None
         self._remark(f'simulated PWM board, protocol {VERSION}; say "hello 1*'
                      + encode(HELLO, 1).decode('ascii').strip().partition('*')[2] + '"')
 
@@ -250,6 +250,7 @@ class SimulatedBoard:
         self._period = -(-period // TICK) * TICK
         self._watchdog = watchdog
         self.next_telemetry = self.time + self._period
+        return None
 
     def _on_enable(self, frame: Frame) -> None:
         if not self.enabled:

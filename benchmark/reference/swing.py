@@ -14,8 +14,8 @@ import bisect
 import numpy as np
 from scipy import optimize
 
-from hysteresis_ros.bicep.bundle import USUAL_YIELD
-from hysteresis_ros.bicep.root import bracket, illinois
+from benchmark.reference.bundle import USUAL_YIELD
+from benchmark.reference.root import bracket, illinois
 
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0

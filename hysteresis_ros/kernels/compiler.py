@@ -1,0 +1,103 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Numba as the kernels use it: its compiler, and its cache made safe. Needs numba installed."""
+
+from collections.abc import Callable, Iterator
+import contextlib
+import logging
+import os
+import threading
+
+import numba
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
+
+from hysteresis_ros.kernels.cache_folder import cache_folder
+
+try:
+    import fcntl
+except ImportError:     # no POSIX: processes that compile at once are on their own
+    fcntl = None
+
+_DECORATING = threading.Lock()
+_REPORTED: set[str] = set()
+
+
+def compile_and_keep(function: Callable) -> Callable:
+    """Return the compiled function, whose machine code is kept in the cache's folder."""
+    compiled = numba.njit(nogil=True, error_model='numpy')(function)
+    # With NUMBA_DISABLE_JIT=1 numba gives the function itself back.
+    folder = cache_folder() if isinstance(compiled, Dispatcher) else None
+    if folder is not None:
+        with _caching_in(folder):
+            compiled._cache = KernelCache(function)
+    return compiled
+
+
+class KernelCache(FunctionCache):
+    """
+    Numba's cache of one function, made safe for processes that compile at once.
+
+    Numba writes the index of what is there before the machine code, and two processes that add to
+    an index at once take the same file name for different code. And a file cut off by a power
+    failure would end every later run with an error. Here a lock goes around each access, and what
+    cannot be read is compiled anew.
+    """
+
+    def load_overload(self, sig, target_context):
+        """Return the compiled function for a signature, or None if it is not there."""
+        try:
+            with self._locked(exclusive=False):
+                return super().load_overload(sig, target_context)
+        except Exception as error:      # whatever pickle makes of a damaged file
+            self._report('read', error)
+            self._forget()
+            return None
+
+    def save_overload(self, sig, data):
+        """Keep the compiled function for a signature."""
+        try:
+            with self._locked(exclusive=True):
+                super().save_overload(sig, data)
+        except OSError as error:
+            self._report('written', error)
+
+    @contextlib.contextmanager
+    def _locked(self, exclusive: bool) -> Iterator[None]:
+        with contextlib.ExitStack() as stack:
+            if fcntl is not None:
+                with contextlib.suppress(OSError):      # a file system without locks, or a full one
+                    os.makedirs(self.cache_path, exist_ok=True)
+                    file = stack.enter_context(open(self._index_path() + '.lock', 'ab'))
+                    fcntl.flock(file, fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH)
+            yield
+
+    def _index_path(self) -> str:
+        return os.path.join(self.cache_path, self._impl.filename_base + '.nbi')
+
+    def _forget(self) -> None:
+        with contextlib.suppress(OSError), self._locked(exclusive=True):
+            os.unlink(self._index_path())
+
+    def _report(self, what: str, error: Exception) -> None:
+        if what not in _REPORTED:       # a full disk is told once, not for each function
+            _REPORTED.add(what)
+            logging.getLogger(__name__).warning(
+                '%s: a compiled function could not be %s (%s: %s)', self.cache_path, what,
+                type(error).__name__, error)
+
+
+@contextlib.contextmanager
+def _caching_in(folder: os.PathLike) -> Iterator[None]:
+    """Have numba's caches made meanwhile use a folder; those of other packages stay as they are."""
+    ours = {'CACHE_DIR': str(folder), 'CACHE_LOCATOR_CLASSES': ''}
+    with _DECORATING:
+        before = {name: getattr(numba.config, name) for name in ours
+                  if hasattr(numba.config, name)}
+        try:
+            for name in before:
+                setattr(numba.config, name, ours[name])
+            yield
+        finally:
+            for name, value in before.items():
+                setattr(numba.config, name, value)

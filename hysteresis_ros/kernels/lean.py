@@ -1,0 +1,23 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How kernels are compiled that allocate nothing: without counting references."""
+
+from collections.abc import Callable
+
+from .jit import jit
+
+
+def lean(function: Callable) -> Callable:
+    """
+    Return a kernel compiled by `jit` that makes no arrays.
+
+    Numba counts references to every array that a function hands on, with atomic operations that
+    cost more than a step of a Preisach operator. A function that makes no arrays needs no count:
+    its caller holds all that it is given.
+    """
+    compiled = jit(function)
+    options = getattr(compiled, 'targetoptions', None)
+    if options is not None:
+        options['_nrt'] = False
+        options['no_cfunc_wrapper'] = True
+    return compiled

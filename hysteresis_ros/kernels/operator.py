@@ -1,0 +1,76 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A compiled operator of any kind: what the arm and the operators' classes call."""
+
+import numpy as np
+
+from . import linear, play, preisach
+from .jit import jit
+from .layout import INPUT, KIND, OUTPUT, PLAY, PREISACH
+from .lean import lean
+
+
+@lean
+def reset(table, memory):
+    """Forget the history."""
+    if table[KIND] == PREISACH:
+        preisach.reset(table, memory)
+    elif table[KIND] == PLAY:
+        play.reset(table, memory)
+    else:
+        linear.reset(table, memory)
+
+
+@lean
+def step(table, memory, u):
+    """Commit an input and return the output."""
+    if table[KIND] == PREISACH:
+        return preisach.step(table, memory, u)
+    if table[KIND] == PLAY:
+        return play.step(table, memory, u)
+    return linear.step(table, memory, u)
+
+
+@lean
+def peek(table, memory, u):
+    """Return the output that `step` would give, and commit nothing."""
+    if table[KIND] == PREISACH:
+        return preisach.peek(table, memory, u)
+    if table[KIND] == PLAY:
+        return play.peek(table, memory, u)
+    return linear.peek(table, memory, u)
+
+
+@lean
+def solve(table, memory, y):
+    """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
+    if table[KIND] == PREISACH:
+        return preisach.solve(table, memory, y)
+    if table[KIND] == PLAY:
+        return play.solve(table, memory, y)
+    return linear.solve(table, memory, y)
+
+
+@jit
+def simulate(table, memory, inputs):
+    """Commit a sequence of inputs, shape (n,), and return the outputs, shape (n,)."""
+    outputs = np.empty(len(inputs))
+    if table[KIND] == PREISACH:
+        for n in range(len(inputs)):
+            outputs[n] = preisach.step(table, memory, inputs[n])
+    else:
+        for n in range(len(inputs)):
+            outputs[n] = step(table, memory, inputs[n])
+    return outputs
+
+
+@lean
+def last_input(table, memory):
+    """Return the input committed last."""
+    return memory[INPUT]
+
+
+@lean
+def last_output(table, memory):
+    """Return the output for it."""
+    return memory[OUTPUT]

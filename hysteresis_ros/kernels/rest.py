@@ -1,0 +1,123 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The arm at rest: where the muscle is as long as the arm lets it, under the load that the arm asks.
+
+``L(theta) = H2[F(theta) - x]``, and the unknown is ``u = F - x``, because H2 then gives all else.
+"""
+
+import math
+
+import numpy as np
+
+from . import bundle, grid, root
+from .arm import (
+    ANGLE, BUNDLE_SEARCH, DEMAND, demand_at, LINE, LOAD, place, present, required, REST_GAIN,
+    REST_SEARCH)
+from .lean import lean
+from .operator import last_input, last_output, peek, solve, step
+
+
+@lean
+def settle(arm, state, line, x, offset, factor):
+    """Commit the u next to the present one at which one muscle balances, and return the place."""
+    table, memory, motion = arm.wires.table, state.memories[0], state.motion
+    start = u = last_input(table, memory)
+    here = _lacking(arm, state, line, u, x, offset, factor)
+    if abs(here) > arm.tolerance:
+        u = root.begin(motion, REST_SEARCH, u, here, here * motion[REST_GAIN], -np.inf, np.inf,
+                       arm.tolerance)
+        while root.searching(motion, REST_SEARCH):
+            u = root.proceed(
+                motion, REST_SEARCH, _lacking(arm, state, line, u, x, offset, factor))
+        motion[REST_GAIN] = min(max((u - start) / here, 0.5), 10.0)
+        step(table, memory, u)
+    return place(arm, motion, line, factor * (last_output(table, memory) - arm.base), offset)
+
+
+@lean
+def _lacking(arm, state, line, u, x, offset, factor):
+    """Return the load that the arm asks for beyond the one under which H2 has the input u."""
+    output = peek(arm.wires.table, state.memories[0], u)
+    k, share = place(arm, state.motion, line, factor * (output - arm.base), offset)
+    return grid.between(arm.grid, LOAD + LINE * line, k, share) - x - u
+
+
+@lean
+def settle_bundle(arm, state, line, x, offset, factor, dt):
+    """Commit what unequal muscles do, and return the place where they balance."""
+    motion, last = state.motion, len(arm.grid) - 1
+    near = float(last)
+    if not math.isnan(motion[ANGLE]):
+        k, share = present(arm, motion)
+        near = min(max(k - 1 + share, 0.0), float(last))
+    point = near
+    k, share, here = _lacking_bundle(arm, state, line, point, x, offset, factor, dt)
+    if abs(here) > arm.tolerance:
+        # Along the grid the muscles give way by about this much.
+        column = DEMAND + LINE * line
+        scale = bundle.TYPICAL_COMPLIANCE * last / (
+            arm.grid[last, column] - arm.grid[0, column])
+        point = root.begin(
+            motion, BUNDLE_SEARCH, near, here, scale * motion[BUNDLE_SEARCH + bundle.GAIN] * here,
+            0.0, float(last), arm.tolerance)
+        while root.searching(motion, BUNDLE_SEARCH):
+            k, share, missing = _lacking_bundle(
+                arm, state, line, point, x, offset, factor, dt)
+            point = root.proceed(motion, BUNDLE_SEARCH, missing)
+        if 0.0 < point < last:
+            bundle.keep_gain(motion, BUNDLE_SEARCH, point - near, scale, here)
+    bundle.commit(arm.wires, state.memories, state.inputs)
+    return k, share
+
+
+@lean
+def _lacking_bundle(arm, state, line, point, x, offset, factor, dt):
+    """Return the place at a point of the grid, and the load that is missing there."""
+    k = min(int(point), len(arm.grid) - 2) + 1
+    share = point - (k - 1)
+    output = arm.base + demand_at(arm, line, k, share, offset) / factor
+    load = required(arm, state.motion, line, k, share, dt)
+    bundle.inputs_for(arm.wires, state.memories, output, load - x, state.inputs)
+    return k, share, load - bundle.mean_load(state.inputs, x)
+
+
+@lean
+def direction(arm, state, x, offset, factor, dt):
+    """Return in which direction the arm slides: 1 down, -1 up, 0 where friction holds it."""
+    motion = state.motion
+    k, share = present(arm, motion)
+    if arm.rigid:
+        tension = max(last_input(arm.wires.table, state.memories[0]) + x, 0.0)
+        if required(arm, motion, 1, k, share, dt) > tension:
+            return 1
+        return -1 if required(arm, motion, 2, k, share, dt) < tension else 0
+    sinking = _lacking_held(arm, state, k, share, 1.0, x, offset, factor, dt)
+    if sinking > 0.0:
+        return 1
+    rising = _lacking_held(arm, state, k, share, -1.0, x, offset, factor, dt)
+    if rising < 0.0:
+        return -1
+    drag = root.between(motion, REST_SEARCH, 1.0, sinking, -1.0, rising, arm.tolerance)
+    while root.searching(motion, REST_SEARCH):
+        drag = root.proceed(motion, REST_SEARCH, _lacking_held(
+            arm, state, k, share, drag, x, offset, factor, dt))
+    # The arm stands still, but its load has changed, and with it what the load does.
+    bundle.commit(arm.wires, state.memories, state.inputs)
+    return 0
+
+
+@lean
+def _lacking_held(arm, state, k, share, drag, x, offset, factor, dt):
+    """Return the load that is missing where friction takes a part, -1 to 1, of what it can."""
+    edge, part = 1 if drag > 0.0 else 2, abs(drag)
+    demand = demand_at(arm, 0, k, share, offset)
+    demand += part * (demand_at(arm, edge, k, share, offset) - demand)
+    load = required(arm, state.motion, 0, k, share, dt)
+    load += part * (required(arm, state.motion, edge, k, share, dt) - load)
+    output = arm.base + demand / factor
+    if len(arm.wires.offsets) > 1:
+        bundle.inputs_for(arm.wires, state.memories, output, load - x, state.inputs)
+    else:
+        state.inputs[0] = solve(arm.wires.table, state.memories[0], output)[0]
+    return load - bundle.mean_load(state.inputs, x)

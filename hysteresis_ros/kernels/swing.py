@@ -1,0 +1,145 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One step of an arm in motion.
+
+The muscle pulls with what the arm asks for at rest, less what friction and inertia take:
+``n F r(theta) = tau(theta) - tau_c - b dtheta/dt - I d2theta/dt2``. It gives way as always, so a
+jerk also stretches what is elastic in it, and an arm that swings faster than its muscle shortens
+leaves the muscle loose.
+"""
+
+import math
+
+from . import grid, root
+from .arm import (
+    INSIDE, LENGTH, LEVERAGE, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD, REST_SEARCH, SCALE, STRETCH,
+    SWING_GAIN, THETA)
+from .bundle import TYPICAL_COMPLIANCE
+from .lean import lean
+from .operator import last_input, peek, step
+
+# Least share of a load that is missing by which the load changes in a step.
+LEAST_GAIN = 1e-3
+# Load that may be missing, over that at rest.
+LOOSER = 1e4
+# How exactly an elongation [m] is met.
+EXACT = 1e-9
+
+
+@lean
+def swing(arm, state, x, offset, factor, friction, dt):
+    """
+    Commit what the muscle does in a step and return the place at which the step ends.
+
+    Parameters
+    ----------
+    arm, state : Arm, State
+    x : float
+        Output of the first stage.
+    offset, factor : float
+        What time and use add to the elongation [m] and do to the stroke.
+    friction : float
+        Moment of dry friction against the motion [N m].
+    dt : float
+        Duration of the step [s].
+    """
+    table, memory, motion = arm.wires.table, state.memories[0], state.motion
+    # Friction and inertia are linear in the angle that the step ends at.
+    speed, acceleration = moved(motion, 0.0, dt)
+    faster, jerked = moved(motion, 1.0, dt)
+    drag = friction + arm.viscous * speed + arm.inertia * acceleration
+    slope = arm.viscous * (faster - speed) + arm.inertia * (jerked - acceleration)
+    tolerance = LOOSER * arm.tolerance
+    start = u = last_input(table, memory)
+    k, share, here = _lacking(arm, state, u, x, offset, factor, drag, slope)
+    if abs(here) > tolerance:
+        u = root.begin(motion, REST_SEARCH, u, here, here * motion[SWING_GAIN], -math.inf,
+                       math.inf, tolerance)
+        while root.searching(motion, REST_SEARCH):
+            k, share, missing = _lacking(arm, state, u, x, offset, factor, drag, slope)
+            u = root.proceed(motion, REST_SEARCH, missing)
+        motion[SWING_GAIN] = min(max((u - start) / here, LEAST_GAIN), 1.5)
+    if u + x < arm.loads[0, INSIDE]:
+        u = arm.loads[0, INSIDE] - x
+        k, share = _fly(arm, drag, slope)
+    step(table, memory, u)
+    return k, share
+
+
+@lean
+def acceleration_at(arm, state, x, offset, factor, k, share, drag):
+    """Return the angular acceleration [rad/s^2] of an arm at a place under a new x."""
+    table, memory, motion = arm.wires.table, state.memories[0], state.motion
+    wanted = grid.between(arm.grid, LENGTH, k, share)
+    u = last_input(table, memory)
+    load, length = _muscle(arm, state, u, x, offset, factor)
+    here = wanted - length
+    if here != 0.0:
+        last = len(arm.loads) - 1
+        u = root.begin(motion, REST_SEARCH, u, here, here / TYPICAL_COMPLIANCE,
+                       arm.loads[0, INSIDE] - x, arm.loads[last, INSIDE] - x, EXACT)
+        while root.searching(motion, REST_SEARCH):
+            load, length = _muscle(arm, state, u, x, offset, factor)
+            u = root.proceed(motion, REST_SEARCH, wanted - length)
+    leverage = grid.between(arm.grid, LEVERAGE, k, share)
+    return (_needed(arm, k, share, drag, 0.0) - load) * leverage / arm.inertia
+
+
+@lean
+def _lacking(arm, state, u, x, offset, factor, drag, slope):
+    """Return the place where the muscle with the input u is, and the load missing there."""
+    load, length = _muscle(arm, state, u, x, offset, factor)
+    k = grid.interval(arm.grid, LENGTH, length, int(state.motion[NEAR_LENGTH]))
+    state.motion[NEAR_LENGTH] = k
+    share = (length - arm.grid[k - 1, LENGTH]) / (
+        arm.grid[k, LENGTH] - arm.grid[k - 1, LENGTH])
+    share = min(max(share, 0.0), 1.0)
+    return k, share, _needed(arm, k, share, drag, slope) - load
+
+
+@lean
+def _muscle(arm, state, u, x, offset, factor):
+    """Return the load of the muscle and its elongation."""
+    n = grid.interval(arm.loads, INSIDE, u + x, int(state.motion[NEAR_LOAD]))
+    state.motion[NEAR_LOAD] = n
+    part = (u + x - arm.loads[n - 1, INSIDE]) / (
+        arm.loads[n, INSIDE] - arm.loads[n - 1, INSIDE])
+    load = (n - 1 + part) * arm.spacing
+    # A loose muscle's load goes on falling, so that the root can be found.
+    part = max(part, 0.0)
+    scale = grid.between(arm.loads, SCALE, n, part)
+    output = peek(arm.wires.table, state.memories[0], u)
+    return load, (arm.base + scale * factor * (output - arm.base)
+                  + grid.between(arm.loads, STRETCH, n, part) + offset)
+
+
+@lean
+def _pull(arm, k, share, drag, slope):
+    """Return the moment that the muscles have to hold at a place where the step may end."""
+    return (grid.between(arm.grid, MOMENT, k, share) - drag
+            - slope * grid.between(arm.grid, THETA, k, share))
+
+
+@lean
+def _needed(arm, k, share, drag, slope):
+    """Return the load that the arm asks for there."""
+    return _pull(arm, k, share, drag, slope) / grid.between(arm.grid, LEVERAGE, k, share)
+
+
+@lean
+def _fly(arm, drag, slope):
+    """Return the place of an arm without a pull."""
+    low, high = 0, len(arm.grid) - 1
+    if _pull(arm, 1, 0.0, drag, slope) <= 0.0:
+        return 1, 0.0
+    if _pull(arm, high, 1.0, drag, slope) >= 0.0:
+        return high, 1.0
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _pull(arm, middle, 1.0, drag, slope) > 0.0:
+            low = middle
+        else:
+            high = middle
+    above, below = _pull(arm, high, 0.0, drag, slope), _pull(arm, high, 1.0, drag, slope)
+    return high, above / (above - below)

@@ -1,0 +1,163 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The arm from sample to sample, and over a whole trial.
+
+Dry friction lets the load lie in a band, inside which the arm sticks; viscous friction and inertia
+add what the present velocity and acceleration cost: by backward differences, of second order over
+equal steps, and while the arm rings by the method of Fox and Goodwin, Newmark's with beta = 1/12,
+whose phase is of fourth order.
+"""
+
+import math
+
+import numpy as np
+
+from . import bundle, grid
+from .arm import (
+    ACCELERATION, ANGLE, BEFORE_DT, BUNDLE_SEARCH, INERTIAL_RATIO, keep_motion, NEAR, NEAR_LENGTH,
+    NEAR_LOAD, present, REST_GAIN, RINGING, SWING_GAIN, THETA, VELOCITY, X)
+from .jit import jit
+from .lean import lean
+from .operator import last_input, last_output, reset
+from .rest import direction, settle, settle_bundle
+from .swing import acceleration_at, swing
+
+# A step longer than this [s] is a settled state to which dynamics contribute nothing.
+LONGEST_TRANSIENT = 5.0
+# What rings so fast that a sample would take more steps than this has come to rest by its end.
+MOST_PIECES = 200
+# An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
+# that is small, does not ring, and is followed in longer steps; the share fades from step to step.
+CALM, FADING = 0.005, 0.97
+
+
+@lean
+def start(arm, state):
+    """Wipe the memory: after a full heat and cool cycle, before the first sample."""
+    for i in range(len(arm.wires.offsets)):
+        reset(arm.wires.table, state.memories[i])
+    motion = state.motion
+    motion[:] = 0.0
+    motion[ANGLE] = motion[BEFORE_DT] = np.nan
+    motion[X] = np.inf
+    motion[REST_GAIN], motion[SWING_GAIN], motion[BUNDLE_SEARCH + bundle.GAIN] = 1.5, 1.0, 1.0
+    motion[NEAR:NEAR + 3] = 1.0
+    motion[NEAR_LENGTH] = motion[NEAR_LOAD] = 1.0
+
+
+@lean
+def output(arm, state):
+    """Return the output of H2 [m]; the mean of the muscles."""
+    if len(arm.wires.offsets) > 1:
+        return bundle.mean_output(arm.wires, state.memories)
+    return last_output(arm.wires.table, state.memories[0])
+
+
+@lean
+def step(arm, state, x, dt, offset, factor):
+    """
+    Advance to the next sample and return the angle [rad].
+
+    Parameters
+    ----------
+    arm, state : Arm, State
+    x : float
+        Output of the first stage, unit of the load.
+    dt : float
+        Time since the sample before [s].
+    offset, factor : float
+        What time and use add to the elongation [m] and do to the stroke.
+    """
+    motion = state.motion
+    pieces = 1
+    ringing = 0.0 < dt < min(LONGEST_TRANSIENT, MOST_PIECES * arm.longest) and (
+        abs(x - motion[X]) > arm.calm or motion[INERTIAL_RATIO] > CALM)
+    motion[RINGING] = 1.0 if ringing else 0.0
+    if ringing:
+        pieces = int(math.ceil(dt / arm.longest))
+        if arm.swings and x != motion[X]:
+            _kick(arm, state, x, offset, factor)
+    motion[X] = x
+    angle = motion[ANGLE]
+    for _ in range(pieces):
+        angle = _advance(arm, state, x, dt / pieces, offset, factor)
+    # What rings is not accelerated for a moment in the middle of its way.
+    motion[INERTIAL_RATIO] = max(arm.inertia * abs(motion[ACCELERATION]) / arm.heaviest,
+                                 FADING ** pieces * motion[INERTIAL_RATIO])
+    return angle
+
+
+@lean
+def _kick(arm, state, x, offset, factor):
+    """Begin a step with the acceleration under a new x."""
+    motion = state.motion
+    velocity = motion[VELOCITY]
+    # An arm that friction holds is not accelerated before it slides.
+    if not math.isnan(motion[ANGLE]) and (velocity != 0.0 or arm.coulomb == 0.0):
+        drag = arm.viscous * velocity
+        if velocity != 0.0:
+            drag += math.copysign(arm.coulomb, velocity)
+        k, share = present(arm, motion)
+        motion[ACCELERATION] = acceleration_at(arm, state, x, offset, factor, k, share, drag)
+
+
+@lean
+def _advance(arm, state, x, dt, offset, factor):
+    motion = state.motion
+    begun = not math.isnan(motion[ANGLE])
+    moving = arm.dynamic and dt < LONGEST_TRANSIENT and begun
+    if moving and dt <= 0.0:
+        return motion[ANGLE]
+    if not moving:
+        dt = 0.0
+    drag = 0
+    if arm.coulomb > 0.0:
+        # At the start the arm has sunk to where it rests, and friction has held it up.
+        drag = direction(arm, state, x, offset, factor, dt) if begun else 1
+        if drag == 0:
+            keep_motion(arm, motion, motion[ANGLE], 0.0)
+            return motion[ANGLE]
+    line = 2 if drag < 0 else drag
+    if moving and arm.swings:
+        k, share = swing(arm, state, x, offset, factor, drag * arm.coulomb, dt)
+    elif len(arm.wires.offsets) > 1:
+        k, share = settle_bundle(arm, state, line, x, offset, factor, dt)
+    else:
+        k, share = settle(arm, state, line, x, offset, factor)
+    angle = grid.between(arm.grid, THETA, k, share)
+    keep_motion(arm, motion, angle, dt)
+    motion[ANGLE] = angle
+    return angle
+
+
+@jit
+def run(arm, state, cold, x, dt, offset, factor):
+    """
+    Run a whole trial from the cold state.
+
+    Parameters
+    ----------
+    arm, state : Arm, State
+    cold : float
+        Output of the first stage in the cold state.
+    x, dt, offset, factor : ndarray, shape (rows,)
+        As for `step`.
+
+    Returns
+    -------
+    rest : float
+        Angle of rest in the cold state [rad].
+    angles, outputs, inputs : ndarray, shape (rows,)
+        Angle [rad], output of H2 [m], and input of the first muscle's H2.
+
+    """
+    rows = len(x)
+    angles, outputs, inputs = np.empty(rows), np.empty(rows), np.empty(rows)
+    start(arm, state)
+    rest = step(arm, state, cold, np.inf, 0.0, 1.0)
+    for n in range(rows):
+        angles[n] = step(arm, state, x[n], dt[n], offset[n], factor[n])
+        outputs[n] = output(arm, state)
+        inputs[n] = last_input(arm.wires.table, state.memories[0])
+    return rest, angles, outputs, inputs

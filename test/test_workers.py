@@ -1,0 +1,152 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Work in several processes: threads of BLAS, and what becomes of workers without a parent."""
+
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+from model_support import arm_run, bicep_model
+import numpy as np
+import pytest
+import threadpoolctl
+
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.workers import delayed, in_parallel, one_blas_thread
+
+# Four each: their own time is a part of a second.
+WORKING = """
+import os, sys, time
+from hysteresis_ros.workers import delayed, in_parallel
+
+def work(folder):
+    open(os.path.join(folder, str(os.getpid())), 'w').close()
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        pass
+
+list(in_parallel([delayed(work)(sys.argv[1])] * 4, 2))
+"""
+
+
+def threads():
+    """Return the numbers of threads of the BLAS libraries loaded here."""
+    return [library['num_threads'] for library in threadpoolctl.threadpool_info()
+            if library['user_api'] == 'blas']
+
+
+def threads_of_worker():
+    """Return the worker's process and its numbers of threads."""
+    np.ones((2, 2)) @ np.ones((2, 2))
+    return os.getpid(), threads()
+
+
+@pytest.fixture
+def three():
+    """Give BLAS three threads, whatever the machine has."""
+    with threadpoolctl.threadpool_limits(3, user_api='blas'):
+        if set(threads()) != {3}:
+            pytest.skip('this BLAS has no threads')
+        yield
+
+
+def test_two_threads_at_once_leave_no_limit_behind(three):
+    """Such as two diagnoses of a notebook: each saving and restoring alone would end with one."""
+    entered, leave = threading.Event(), threading.Event()
+
+    def other():
+        with one_blas_thread():
+            entered.set()
+            leave.wait(10.0)
+
+    with one_blas_thread():
+        with one_blas_thread():
+            assert set(threads()) == {1}
+        assert set(threads()) == {1}
+        thread = threading.Thread(target=other)
+        thread.start()
+        assert entered.wait(10.0)
+        assert set(threads()) == {1}
+    assert set(threads()) == {3}
+    leave.set()
+    thread.join()
+    assert set(threads()) == {3}
+
+
+def test_the_limit_ends_with_an_error(three):
+    """A diagnosis that fails leaves no trace."""
+    @one_blas_thread()
+    def fail():
+        raise ValueError(threads())
+
+    with pytest.raises(ValueError, match='1'):
+        fail()
+    assert set(threads()) == {3}
+
+
+def test_a_diagnosis_leaves_blas_one_thread(three):
+    """And what the user had set afterwards."""
+    seen = []
+
+    def progress(iterable, total):
+        for item in iterable:
+            seen.extend(threads())
+            yield item
+
+    rng = np.random.default_rng(1)
+    voltage = np.concatenate([np.linspace(1.0, 5.0, 20), np.linspace(5.0, 1.0, 20)])
+    run = arm_run(voltage)
+    model = bicep_model()
+    run.columns['angle'] = model.predict(run) + rng.normal(0.0, 0.002, len(voltage))
+    diagnose(model, [run], progress=progress)
+    assert seen and set(seen) == {1}
+    assert set(threads()) == {3}
+
+
+def test_workers_have_one_thread_each(three):
+    """In a process of its own as well."""
+    found = list(in_parallel([delayed(threads_of_worker)()] * 4, 2))
+    assert all(process != os.getpid() and set(numbers) == {1} for process, numbers in found)
+
+
+def test_results_come_in_the_order_of_the_tasks():
+    """Whoever is done first."""
+    tasks = [delayed(time.sleep)(0.2), delayed(divmod)(7, 2), delayed(sorted)([2, 1], reverse=True)]
+    for jobs in (1, 2):
+        assert list(in_parallel(tasks, jobs)) == [None, (3, 1), [2, 1]]
+
+
+@pytest.mark.skipif(not Path('/proc').is_dir(), reason='processes are looked up in /proc')
+def test_workers_end_when_their_parent_is_killed(root, tmp_path):
+    """SIGKILL leaves no time to tell them, and a batch system uses it."""
+    parent = subprocess.Popen([sys.executable, '-c', WORKING, str(tmp_path)], cwd=root)
+    try:
+        workers = set()
+        deadline = time.monotonic() + 60.0
+        while len(workers) < 2:
+            assert parent.poll() is None and time.monotonic() < deadline
+            time.sleep(0.1)
+            workers = {int(path.name) for path in tmp_path.iterdir()}
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+        deadline = time.monotonic() + 15.0
+        while any(map(alive, workers)):
+            assert time.monotonic() < deadline, 'workers go on without their parent'
+            time.sleep(0.1)
+    finally:
+        parent.kill()
+        for process in filter(alive, workers):
+            os.kill(process, signal.SIGKILL)
+
+
+def alive(process):
+    """Return whether a process runs; one that nobody has buried yet does not."""
+    try:
+        status = Path('/proc', str(process), 'stat').read_text(encoding='ascii')
+    except OSError:
+        return False
+    return status.rpartition(')')[2].split()[0] != 'Z'
