@@ -185,6 +185,7 @@ class Encoder:
     def _begin(self, time: float, counter: int) -> None:
         if not self._restarted:
             self._position = self._wrap(counter)
+        self._begun = True
         self._counter = counter
         self._time = time
         self._index = None

@@ -399,7 +399,7 @@ def measure(model: MuscleModel, force: Measurement | None, force_trials: Sequenc
 def _provenance(force: Measurement | None, force_trials: Sequence[float] | None,
                 length: Measurement | None,
                 length_trials: Sequence[float] | None) -> dict[str, Any]:
-    entries = {'hysteresis_ros': __version__, 'numpy': np.__version__}
+    entries: dict[str, Any] = {'hysteresis_ros': __version__, 'numpy': np.__version__}
     for name, measurement, trials in (('force', force, force_trials),
                                       ('length', length, length_trials)):
         if measurement is not None:

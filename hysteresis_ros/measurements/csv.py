@@ -9,7 +9,7 @@ import csv
 import hashlib
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 import warnings
 
 from hysteresis_ros.atomic import AnyPath, replacing
@@ -203,13 +203,14 @@ def text_in_first_row(path: Path, names: Sequence[str], first: int) -> bool:
 
 def load(path: Path, names: Sequence[str], usable: Sequence[str], first: int) -> np.ndarray:
     """Parse the numbers in C, ndarray (rows, usable columns)."""
-    indices = [names.index(name) for name in usable]
+    # NumPy 1.26 takes None and does not say so in its hints.
+    columns: Any = None if len(usable) == len(names) else [names.index(name) for name in usable]
     with warnings.catch_warnings():
         warnings.filterwarnings('ignore', 'loadtxt: input contained no data', UserWarning)
         # An absolute path: NumPy would fetch a relative one that looks like an address.
         return np.loadtxt(str(path.resolve()), delimiter=',', skiprows=first, ndmin=2,
                           encoding='utf-8-sig', comments=None, quotechar='"',
-                          usecols=None if len(indices) == len(names) else indices)
+                          usecols=columns)
 
 
 def numeric_columns(path: Path, names: Sequence[str], first: int) -> tuple[list[str], list[str]]:
