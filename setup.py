@@ -65,6 +65,8 @@ setup(
     license='Apache-2.0',
     keywords=['ROS', 'hysteresis', 'Preisach', 'artificial muscle', 'shape memory alloy'],
     packages=find_packages(include=[PACKAGE, PACKAGE + '.*']),
+    # Tells type checkers that our annotations are meant for them.
+    package_data={PACKAGE: ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + PACKAGE]),
         ('share/' + PACKAGE, ['package.xml']),
@@ -105,6 +107,7 @@ setup(
             'flake8',
             'flake8-quotes',
             'pydocstyle',
+            'mypy',
         ],
     },
     cmdclass={'install_data': InstallData},

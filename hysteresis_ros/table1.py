@@ -9,7 +9,10 @@ lengths under each load, and 40 target angles of the arm twice, a sinusoid and r
 controller sees nothing of what it does: all of it is feedforward, as in the paper.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +28,9 @@ from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import Plant
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.workers import one_blas_thread
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import Controller, MuscleModel
 
 ROWS = ('F-q identification', 'F-q verification', 'F-q compensation', 'L-q identification',
         'L-q verification', 'L-q compensation', 'arm, sinusoidal', 'arm, random')
@@ -109,7 +115,7 @@ def experiment(seed: int, effects: Sequence[str] | None = (), jobs: int = 1) -> 
         extended, added = add_effects(model, length, force, effects, LENGTH_TRIALS, FORCE_TRIALS,
                                       jobs=jobs)
         methods['with effects'] = (extended, 'preisach')
-    rows = [{} for _ in ROWS]
+    rows: list[dict[str, dict[str, float]]] = [{} for _ in ROWS]
     for method, (with_model, kind) in methods.items():
         plant = Plant(seed, recording=1)
         for k, (residual, span) in enumerate(residuals(
@@ -120,7 +126,9 @@ def experiment(seed: int, effects: Sequence[str] | None = (), jobs: int = 1) -> 
             'baselines': baselines(force, length)}
 
 
-def residuals(plant, model, method: str, force, length, chance):
+def residuals(plant: Plant, model: MuscleModel, method: str, force: Measurement,
+              length: Measurement,
+              chance: np.random.Generator) -> Iterator[tuple[np.ndarray, float]]:
     """
     Yield residual and output range for each row of Table I.
 
@@ -171,39 +179,40 @@ class Inverse:
         Two-stage inverse, or that of the linear model.
     """
 
-    def __init__(self, model, method: str):
+    def __init__(self, model: MuscleModel, method: str) -> None:
         self.limits = model.ranges[model.drive]
-        self._model, self._linear = model, method == 'linear'
+        self._model = model
+        self._line = model.linear if method == 'linear' else None
 
-    def _controller(self, arm=False):
+    def _controller(self, arm: bool = False) -> Controller:
         return self._model.controller(voltage_limits=self.limits, arm=arm)
 
     def forces(self, wanted: np.ndarray) -> np.ndarray:
         """Return the drives for forces at resting length, shape (n,)."""
-        if self._linear:
-            return np.clip(self._model.linear.drive_for_force(wanted), *self.limits)
+        if self._line is not None:
+            return np.clip(self._line.drive_for_force(wanted), *self.limits)
         controller = self._controller()
         return np.array([controller.force_setpoint(force).voltage for force in wanted])
 
     def lengths(self, wanted: np.ndarray, load: float) -> np.ndarray:
         """Return the drives for lengths under one load, shape (n,)."""
-        if self._linear:
-            return np.clip(self._model.linear.drive_for_length(wanted, load), *self.limits)
+        if self._line is not None:
+            return np.clip(self._line.drive_for_length(wanted, load), *self.limits)
         controller = self._controller()
         return np.array([controller.setpoint(length, load).voltage for length in wanted])
 
     def angles(self, wanted: np.ndarray) -> np.ndarray:
         """Return the drives for angles of the arm [rad], shape (n,)."""
         geometry = self._model.require_geometry()
-        if self._linear:
-            return np.clip(self._model.linear.drive_for_length(
+        if self._line is not None:
+            return np.clip(self._line.drive_for_length(
                 geometry.length(wanted), geometry.force(wanted)), *self.limits)
         controller = self._controller(arm=True)
         references = (controller.reference(theta) for theta in wanted.tolist())
         return np.array([controller.setpoint(*reference).voltage for reference in references])
 
 
-def baselines(force, length) -> dict:
+def baselines(force: Measurement, length: Measurement) -> dict:
     """
     Return how far the models are off that the paper compares with.
 
@@ -218,7 +227,7 @@ def baselines(force, length) -> dict:
     forces = force.select(FORCE_TRIALS)
     span = float(np.ptp(length.column('length')))
 
-    def mean_error(predicted, table):
+    def mean_error(predicted: np.ndarray, table: Measurement) -> float:
         return float(np.mean(np.abs(predicted - table.column('length'))))
     result = {}
     for name, (model, _) in (('additive', fit_additive(fitted)),

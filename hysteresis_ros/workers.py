@@ -12,6 +12,7 @@ import contextlib
 import os
 import threading
 import time
+from typing import Any
 
 import threadpoolctl
 
@@ -49,7 +50,7 @@ def one_blas_thread() -> Iterator[None]:
             _holders[thread] -= 1
             if not _holders[thread]:
                 del _holders[thread]
-                if main or not _holders:
+                if _limits is not None and (main or not _holders):
                     _limits.restore_original_limits()
 
 
@@ -84,7 +85,7 @@ def in_parallel(tasks: Iterable, jobs: int) -> Iterator:
         yield from parallel(tasks)
 
 
-def _work(giver: int, function: Callable, args: tuple, kwargs: dict):
+def _work(giver: int, function: Callable, args: tuple, kwargs: dict) -> Any:
     """Do a task that the process `giver` gave."""
     if os.getppid() == giver != os.getpid():
         end_with(giver)
@@ -106,7 +107,7 @@ def end_with(parent: int) -> None:
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 
-def _watch(parent):
+def _watch(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(LOOK_PERIOD)
     os._exit(1)     # not sys.exit, which ends this thread alone

@@ -52,6 +52,9 @@ def at_import(tree):
     pending = list(tree.body)
     while pending:
         node = pending.pop()
+        if isinstance(node, ast.If) and dotted(node.test) == 'TYPE_CHECKING':
+            pending += node.orelse
+            continue
         yield node
         if not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
             pending += ast.iter_child_nodes(node)

@@ -57,7 +57,7 @@ def run(error, minutes=20, rate=5, seed=0, trials=2, extra=None):
 
 def test_the_json_has_the_names_that_programs_rely_on():
     comparison = compare(FakeModel(), [run(lambda t, v, up: 0.02 * (v > 5))])
-    content = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
+    content = json.loads(json.dumps(comparison.to_dict(), allow_nan=False))
     assert {'rows', 'quantity', 'unit', 'model', 'linear', 'by_trial', 'where'} <= set(content)
     assert (content['rows'], content['quantity'], content['unit']) == (6000, 'angle', 'rad')
     for errors in (content['model'], content['linear'], content['by_trial'][0]['model']):
@@ -212,13 +212,13 @@ def test_one_row_and_a_constant_response_are_compared():
     one = Measurement.from_columns({'time': [0.0], 'voltage': [1.0], 'angle': [1.8]})
     comparison = compare(FakeModel(), [one])
     assert comparison.rows == 1
-    json.dumps(comparison.to_json(), allow_nan=False)
+    json.dumps(comparison.to_dict(), allow_nan=False)
     assert '-' in comparison.to_text()
 
 
 def test_a_model_without_a_linear_part():
     comparison = compare(FakeModel(linear=None), [run(lambda t, v, up: 0.0)])
-    assert comparison.linear is None and comparison.to_json()['linear'] is None
+    assert comparison.linear is None and comparison.to_dict()['linear'] is None
     assert 'linear' not in comparison.to_text()
 
 

@@ -59,7 +59,7 @@ def reported(found):
 
 def check_json(found):
     """The names and types that programs rely on."""
-    content = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    content = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert content['verdict'] in ('adequate', 'missing', 'unknown', 'not_excited')
     assert set(content['missing']) <= set(catalogue())
     assert len(content['alternatives']) == len(content['missing'])
@@ -195,7 +195,7 @@ def test_the_same_recording_gives_the_same_verdict_whatever_the_jobs(model, monk
     monkeypatch.setattr(search, 'possible', lambda problem, known: (
         ['payload_error', 'encoder_offset'], possible(problem, known)[1]))
     train, _ = recordings({'payload_error': 1.0})
-    one, two = (diagnose(model, [train], jobs=jobs, seed=3).to_json() for jobs in (1, 2))
+    one, two = (diagnose(model, [train], jobs=jobs, seed=3).to_dict() for jobs in (1, 2))
     assert one == two
     assert set(one) >= {field.name for field in dataclasses.fields(Diagnosis)} - {
         'effects'}

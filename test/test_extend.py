@@ -75,7 +75,7 @@ def test_the_error_of_a_model_is_that_over_all_rows_of_all_recordings(base, reco
 
 def test_the_json_is_as_programs_expect_it(extension):
     """Plain finite numbers under the names that were promised."""
-    content = json.loads(json.dumps(extension.to_json(), allow_nan=False))
+    content = json.loads(json.dumps(extension.to_dict(), allow_nan=False))
     assert content['added'] == ['payload_error', 'encoder_offset']
     assert set(content['parameters']) == set(content['added'])
     assert set(content['parameters']['payload_error']['dm']) >= {'value', 'low', 'high', 'unit'}

@@ -32,7 +32,7 @@ def test_repeating_the_rows_changes_no_error(residual, times):
 def test_a_response_that_does_not_vary_has_no_percentage():
     found = errors(np.array([1.0, 1.0]), 0.0)
     assert np.isnan(found.mean_percent)
-    assert found.to_json() == {'mean_abs': 1.0, 'std': 0.0, 'rmse': 1.0, 'mean_percent': None,
+    assert found.to_dict() == {'mean_abs': 1.0, 'std': 0.0, 'rmse': 1.0, 'mean_percent': None,
                                'std_percent': None}
 
 

@@ -158,6 +158,12 @@ def test_pip_installs_what_ros2_run_needs(wheel, tmp_path):
     assert 'identify' in done.stdout
 
 
+def test_type_checkers_of_users_see_our_hints(wheel):
+    """The marker of PEP 561 comes with the package."""
+    with zipfile.ZipFile(wheel) as archive:
+        assert 'hysteresis_ros/py.typed' in archive.namelist()
+
+
 def test_the_wheel_holds_the_package_alone(wheel):
     """Tests, tools and benchmarks stay in the checkout."""
     with zipfile.ZipFile(wheel) as archive:

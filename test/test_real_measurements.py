@@ -63,7 +63,7 @@ def test_a_piezo_stack_is_described_by_one_operator(data):
     first = Measurement.from_columns(
         {name: values[:rows] for name, values in table.columns.items()}, source=table.source)
     model = identify(first, operator='preisach').model
-    report = compare(model, [first]).to_json()
+    report = compare(model, [first]).to_dict()
     assert report['quantity'] == 'length' and report['rows'] == rows
     assert report['model']['mean_percent'] < 1.5
     assert report['linear']['mean_percent'] > 2.0 * report['model']['mean_percent']

@@ -55,6 +55,13 @@ def test_docstrings(root):
         run_module(root, 'pydocstyle', '--convention=numpy', '--add-ignore=D105', *paths)
 
 
+@pytest.mark.skipif(find_spec('mypy') is None, reason='mypy is not installed (extra `test`)')
+def test_types(root, request):
+    """Type hints are complete and true in every folder that setup.cfg does not except."""
+    cache = request.config.cache.mkdir('mypy')
+    run_module(root, 'mypy', '--config-file', 'setup.cfg', '--cache-dir', str(cache))
+
+
 def test_headers(root):
     """Every Python file says whose it is and under which license."""
     without = [path for path in python_files(root)

@@ -11,17 +11,24 @@ Two watchdogs cut the muscle off. The host's: no `Board.set_voltage` within ``ti
 and 0 is sent. The board's: no setpoint within ``timeouts.watchdog``, and it stops on its own.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
 import threading
 import time
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.bridge.board_clock import BoardClock
 from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
 from hysteresis_ros.bridge.board_state import Sample, Status
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.messages import (
-    DISABLE, ENABLE, FAULTS, NO, SET, Telemetry, TELEMETRY)
+    DISABLE, ENABLE, FAULTS, Identity, NO, SET, Telemetry, TELEMETRY)
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError
+
+if TYPE_CHECKING:
+    from hysteresis_ros.bridge.protocol import Fields
 
 SUPPLY_SAMPLES = 50         # measurements of the supply over which is averaged, about
 SUPPLY_JUMP = 0.03          # relative change that is taken at once
@@ -76,9 +83,11 @@ class Board:
 
     """
 
-    def __init__(self, port, baud=115200, pwm=Pwm(), encoder=None, timeouts=Timeouts(),
-                 telemetry_period=0.1, supply=12.0, supply_tolerance=0.25,
-                 on_sample=lambda sample: None):
+    def __init__(self, port: str, baud: int = 115200, pwm: Pwm = Pwm(),
+                 encoder: Encoder | None = None, timeouts: Timeouts = Timeouts(),
+                 telemetry_period: float = 0.1, supply: float = 12.0,
+                 supply_tolerance: float = 0.25,
+                 on_sample: Callable[[Sample], None] = lambda sample: None) -> None:
         self.pwm = pwm
         self._encoder = encoder or Encoder()
         self._timeouts = timeouts
@@ -92,14 +101,15 @@ class Board:
         self._stopping = threading.Event()
         self._news = False          # something for the writer
         self._wanted = False        # whether the board shall be enabled
-        self._target = None         # (voltage, wall time at which it was set)
+        # (voltage, wall time at which it was set)
+        self._target: tuple[float, float] | None = None
         self._online = False
         self._problem = ''
-        self._write_problem = None
-        self._supply = None         # averaged over so many samples:
+        self._write_problem: BoardError | ProtocolError | None = None
+        self._supply: float | None = None   # averaged over so many samples:
         self._supply_samples = 0
-        self._identity = None
-        self._sample = None
+        self._identity: Identity | None = None
+        self._sample: Sample | None = None
         self._received = 0.0        # wall time of the latest sample
         self._limit = ''
         self._refusal = ''
@@ -108,19 +118,19 @@ class Board:
                          for target, name in ((self._run, 'board reader'),
                                               (self._write, 'board writer'))]
 
-    def __enter__(self):
+    def __enter__(self) -> 'Board':
         self.start()
         return self
 
-    def __exit__(self, *error):
+    def __exit__(self, *error: object) -> None:
         self.stop()
 
-    def start(self):
+    def start(self) -> None:
         """Begin to look for the board. Returns at once."""
         for thread in self._threads:
             thread.start()
 
-    def stop(self):
+    def stop(self) -> None:
         """
         Switch the output off, wait a moment until the board says so, and close the port.
 
@@ -132,7 +142,8 @@ class Board:
         self._say_zero()
         deadline = time.monotonic() + STOP_PATIENCE
         with self._wake:
-            while self._online and self._sample.enabled and time.monotonic() < deadline:
+            while (self._online and self._sample is not None and self._sample.enabled
+                   and time.monotonic() < deadline):
                 self._wake.wait(deadline - time.monotonic())
             self._stopping.set()
             self._wake.notify_all()
@@ -142,7 +153,7 @@ class Board:
         self._link.close()
         self._online = False
 
-    def set_voltage(self, voltage):
+    def set_voltage(self, voltage: float) -> None:
         """
         Ask for a voltage. Never waits.
 
@@ -162,13 +173,13 @@ class Board:
             self._target = (voltage, time.monotonic())
             self._tell_writer()
 
-    def set_zero(self):
+    def set_zero(self) -> None:
         """Ask for 0 V until the next `set_voltage`. Never waits."""
         with self._wake:
             self._target = None
             self._tell_writer()
 
-    def enable(self, wanted):
+    def enable(self, wanted: bool) -> None:
         """
         Let the board take setpoints, or switch its output off. Never waits.
 
@@ -185,22 +196,22 @@ class Board:
             self._limit = ''
             self._tell_writer()
 
-    def clear_fault(self):
+    def clear_fault(self) -> None:
         """Clear the fault of the encoder's angle, because somebody has checked it."""
         self._encoder.clear_fault()
 
     @property
-    def slowness(self):
+    def slowness(self) -> float:
         """How many seconds of the wall a second of the slower clock takes, at least 1."""
         return 1.0 / min(self.speed, 1.0)
 
     @property
-    def speed(self):
+    def speed(self) -> float:
         """How fast the board's clock runs against the wall's; 1 before the first greeting."""
         return self._identity.speed if self._identity else 1.0
 
     @property
-    def status(self):
+    def status(self) -> Status:
         """How things are, as a `Status`."""
         with self._wake:
             sample = self._sample
@@ -214,17 +225,18 @@ class Board:
                 self._link.lost_frames, self._connections,
                 f'"{bad.text}": {bad.reason}' if bad else '')
 
-    def _tell_writer(self):
+    def _tell_writer(self) -> None:
         self._news = True
         self._wake.notify_all()
 
-    def _expired(self):
-        age = time.monotonic() - self._target[1]
-        return age > self._timeouts.setpoint * self.slowness
+    def _expired(self) -> bool:
+        if self._target is None:
+            return True
+        return time.monotonic() - self._target[1] > self._timeouts.setpoint * self.slowness
 
     # The reading thread
 
-    def _run(self):
+    def _run(self) -> None:
         delay = self._timeouts.first_retry
         while not self._stopping.is_set():
             connections = self._connections
@@ -243,7 +255,7 @@ class Board:
             self._stopping.wait(delay)
             delay = min(2.0 * delay, self._timeouts.last_retry)
 
-    def _greet(self):
+    def _greet(self) -> None:
         identity = self._link.greet(self._period, self._timeouts.watchdog, self._stopping)
         with self._wake:
             if self._identity is None:
@@ -259,7 +271,7 @@ class Board:
             self._supply = None
             self._connections += 1
 
-    def _listen(self):
+    def _listen(self) -> None:
         """Read telemetry until the board starts anew; raise when it is lost."""
         patience = self._timeouts.telemetry * self.slowness
         while not self._stopping.is_set():
@@ -279,16 +291,17 @@ class Board:
                 raise BoardError(f'port {self._link.port}: the board is silent, no telemetry for '
                                  f'{patience:.3g} s; the output is off')
 
-    def _take(self, telemetry):
+    def _take(self, telemetry: Telemetry) -> None:
         reading = self._encoder.update(self._clock.follow(telemetry.time), telemetry.counts,
                                        telemetry.index, telemetry.latch)
-        self._smooth(telemetry.supply)
+        supply = self._smooth(telemetry.supply)
         sample = Sample(
             self._clock.time, reading.angle, reading.velocity, reading.fresh,
-            self.pwm.voltage(telemetry.duty, self._supply), self._supply, telemetry.ambient,
+            self.pwm.voltage(telemetry.duty, supply), supply, telemetry.ambient,
             telemetry.enabled, telemetry.faults, reading.fault)
         with self._wake:
-            if not self._online or sample.enabled != self._sample.enabled:
+            if (not self._online or self._sample is None
+                    or sample.enabled != self._sample.enabled):
                 self._tell_writer()
             self._online = True
             self._problem = ''
@@ -296,16 +309,18 @@ class Board:
             self._received = time.monotonic()
         self._on_sample(sample)
 
-    def _smooth(self, supply):
-        """Average the supply, so that its noise does not move the muscle to and fro."""
+    def _smooth(self, supply: float) -> float:
+        """Return the supply's average, so that its noise does not move the muscle to and fro."""
         before = self._supply
         if before is None or abs(supply - before) > SUPPLY_JUMP * self._nominal_supply:
-            self._supply, self._supply_samples = supply, 1
+            average, self._supply_samples = supply, 1
         else:
             self._supply_samples = min(self._supply_samples + 1, SUPPLY_SAMPLES)
-            self._supply += (supply - before) / self._supply_samples
+            average = before + (supply - before) / self._supply_samples
+        self._supply = average
+        return average
 
-    def _lose(self, problem):
+    def _lose(self, problem: str) -> None:
         with self._wake:
             self._online = False
             self._problem = problem
@@ -315,7 +330,7 @@ class Board:
 
     # The writing thread
 
-    def _write(self):
+    def _write(self) -> None:
         while True:
             with self._wake:
                 self._wake.wait_for(lambda: self._news or self._stopping.is_set(),
@@ -331,29 +346,30 @@ class Board:
             except (BoardError, ProtocolError) as error:
                 self._write_problem = error
 
-    def _command(self):
+    def _command(self) -> tuple[str, Fields | None] | None:
         """Return what the board has to hear now: (kind, fields), or None."""
-        if self._wanted != self._sample.enabled:
+        if self._sample is None or self._wanted != self._sample.enabled:
             return (ENABLE if self._wanted else DISABLE, None)
         if not self._wanted:
             return None
         return (SET, {'duty': self._duty()})
 
-    def _duty(self):
+    def _duty(self) -> float:
         self._limit = ''
-        if self._target is None or self._expired():
+        supply = self._supply
+        if self._target is None or supply is None or self._expired():
             return 0.0
-        off = abs(self._supply - self._nominal_supply)
+        off = abs(supply - self._nominal_supply)
         if off > self._supply_tolerance * self._nominal_supply:
             self._limit = (
-                f'the supply measures {self._supply:.3g} V, {self._nominal_supply:g} V expected: '
+                f'the supply measures {supply:.3g} V, {self._nominal_supply:g} V expected: '
                 'output off; check the supply and the parameter supply_voltage')
             return 0.0
-        drive = self.pwm.drive(self._target[0], self._supply)
+        drive = self.pwm.drive(self._target[0], supply)
         self._limit = drive.limit
         return drive.duty
 
-    def _say_zero(self):
+    def _say_zero(self) -> None:
         """Tell the board to stop, as far as it can still hear."""
         try:
             self._link.send(SET, {'duty': 0.0})

@@ -12,16 +12,16 @@ class BoardClock:
     A board that started anew is told by `back`; `begin` then takes its new clock over.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._milliseconds = 0
-        self._last = None
+        self._last = 0
 
     @property
-    def time(self):
+    def time(self) -> float:
         """Seconds since `begin` was first called; 0 before."""
         return self._milliseconds / 1000.0
 
-    def begin(self, milliseconds, gap=0.0):
+    def begin(self, milliseconds: int, gap: float = 0.0) -> None:
         """
         Take the board's clock as it is now.
 
@@ -36,7 +36,7 @@ class BoardClock:
         self._milliseconds += round(1000.0 * gap)
         self._last = milliseconds
 
-    def back(self, milliseconds):
+    def back(self, milliseconds: int) -> bool:
         """
         Tell whether the board's clock has gone back, so that the board must have started anew.
 
@@ -52,7 +52,7 @@ class BoardClock:
         """
         return (milliseconds - self._last) % TIME_LIMIT >= TIME_LIMIT // 2
 
-    def follow(self, milliseconds):
+    def follow(self, milliseconds: int) -> float:
         """
         Take a reading.
 

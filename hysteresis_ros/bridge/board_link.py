@@ -8,11 +8,12 @@ import importlib
 import os
 import threading
 import time
+from typing import Any
 
 import serial
 
 from hysteresis_ros.bridge.messages import BOARD, CONFIG, HELLO, Identity, NO, OK
-from hysteresis_ros.bridge.protocol import Decoder, encode, Frame, SEQUENCE_LIMIT, VERSION
+from hysteresis_ros.bridge.protocol import Decoder, encode, Fields, Frame, SEQUENCE_LIMIT, VERSION
 from hysteresis_ros.errors import BoardError, ParameterError
 
 HANDLERS = 'hysteresis_ros.bridge.urlhandlers'
@@ -102,12 +103,12 @@ class BoardLink:
 
     """
 
-    def __init__(self, port, baud, timeouts):
+    def __init__(self, port: str, baud: int, timeouts: Timeouts) -> None:
         self.port = port
         self.decoder = Decoder()
         self.lost_frames = 0
         self._timeouts = timeouts
-        self._expected = None       # sequence number of the board's next frame
+        self._expected: int | None = None   # sequence number of the board's next frame
         self._sequence = 0
         self._bytes = 0
         self._writing = threading.Lock()
@@ -119,7 +120,7 @@ class BoardLink:
             check_url(port)
         self._settings = {'baudrate': baud, 'timeout': READ_TIMEOUT,
                           'write_timeout': timeouts.write, 'exclusive': True}
-        self._serial = None
+        self._serial: Any = None    # pyserial has no type hints
         try:
             self._make()
         except serial.SerialException:
@@ -127,7 +128,7 @@ class BoardLink:
         except ValueError as error:
             raise ParameterError(f'port {port}: {error}') from None
 
-    def open(self):
+    def open(self) -> None:
         """
         Open the port.
 
@@ -142,13 +143,13 @@ class BoardLink:
             self._serial.open()
         except (OSError, ValueError) as error:
             number = getattr(error, 'errno', None)
-            reason = _HINTS.get(number) or (os.strerror(number) if number else str(error))
+            reason = _HINTS.get(number or 0) or (os.strerror(number) if number else str(error))
             reason = reason.replace(f'Could not open port {self.port}: ', '')
             raise BoardError(f'port {self.port} cannot be opened: {reason}') from None
         self.decoder.feed(b'\n')
         self._expected = None
 
-    def close(self):
+    def close(self) -> None:
         """Close the port, whatever state it is in."""
         try:
             if self._serial is not None:
@@ -156,7 +157,7 @@ class BoardLink:
         except OSError:
             pass    # a device that is gone cannot be closed any better
 
-    def greet(self, period, watchdog, stopping):
+    def greet(self, period: float, watchdog: float, stopping: threading.Event) -> Identity:
         """
         Find out who is there and tell the board its periods.
 
@@ -190,7 +191,7 @@ class BoardLink:
                   stopping)
         return identity
 
-    def send(self, kind, fields=None):
+    def send(self, kind: str, fields: Fields | None = None) -> int:
         """
         Send one frame.
 
@@ -218,7 +219,7 @@ class BoardLink:
             self._write(encode(kind, sequence, fields))
         return sequence
 
-    def read(self):
+    def read(self) -> list[Frame]:
         """
         Wait a moment for frames.
 
@@ -246,11 +247,11 @@ class BoardLink:
             self._expected = (frame.sequence + 1) % SEQUENCE_LIMIT
         return frames
 
-    def _make(self):
+    def _make(self) -> None:
         if self._serial is None:
             self._serial = serial.serial_for_url(self.port, do_not_open=True, **self._settings)
 
-    def _ask(self, kind, fields, stopping):
+    def _ask(self, kind: str, fields: Fields | None, stopping: threading.Event) -> Frame:
         asked = set()
         now = time.monotonic()
         give_up = now + self._timeouts.greeting
@@ -270,7 +271,7 @@ class BoardLink:
             now = time.monotonic()
         raise BoardError(self._no_answer(kind))
 
-    def _no_answer(self, kind):
+    def _no_answer(self, kind: str) -> str:
         within = f'within {self._timeouts.greeting:g} s'
         if self.decoder.last_bad is not None and self._bytes:
             return (f'port {self.port}: no answer to {kind!r} {within}, but {self._bytes} bytes '
@@ -280,7 +281,7 @@ class BoardLink:
             return f'port {self.port}: no answer to {kind!r} {within}; is the board listening?'
         return f'port {self.port}: silent, no answer to {kind!r} {within}; is the board on?'
 
-    def _write(self, data):
+    def _write(self, data: bytes) -> None:
         if self._serial is None:
             raise BoardError(f'port {self.port} is not open')
         try:

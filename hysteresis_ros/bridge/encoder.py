@@ -77,9 +77,10 @@ class Encoder:
 
     """
 
-    def __init__(self, counts_per_revolution=AMT103_COUNTS, direction=1, zero=0.0,
-                 counter_bits=32, maximum_speed=30.0, velocity_window=0.1, index='ignore',
-                 index_angle=0.0):
+    def __init__(self, counts_per_revolution: int = AMT103_COUNTS, direction: int = 1,
+                 zero: float = 0.0, counter_bits: int = 32, maximum_speed: float = 30.0,
+                 velocity_window: float = 0.1, index: str = 'ignore',
+                 index_angle: float = 0.0) -> None:
         if counts_per_revolution < 4:
             raise ParameterError(f'counts_per_revolution {counts_per_revolution}: at least 4')
         if direction not in (-1, 1):
@@ -102,41 +103,44 @@ class Encoder:
         self._index_angle = index_angle
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget everything: the next sample is the first."""
-        self._position = None       # counts from the angle `zero`, unwrapped
-        self._counter = None        # the counter as last believed
-        self._time = None
-        self._suspect = None        # (time, counter) of a sample that was not believed
+        self._begun = False
+        self._position = 0          # counts from the angle `zero`, unwrapped
+        self._counter = 0           # the counter as last believed
+        self._time = 0.0
+        # (time, counter) of a sample that was not believed
+        self._suspect: tuple[float, int] | None = None
         self._restarted = False
-        self._history = collections.deque()
-        self._index = None
-        self._index_position = None
+        self._history: collections.deque[tuple[float, int]] = collections.deque()
+        self._index: int | None = None
+        self._index_position: int | None = None
         self._fault = ''
 
-    def restart(self):
+    def restart(self) -> None:
         """
         Take note that the board has started anew, so that its counter begins again.
 
         The arm is taken to be where it was; that is a fault until the index pulse or
         `clear_fault` ends it.
         """
-        if self._position is not None:
+        if self._begun:
             self._restarted = True
             self._fault = ('the board has started anew: its encoder counter was lost, the angle '
                            'is carried on from before and may be off')
 
-    def clear_fault(self):
+    def clear_fault(self) -> None:
         """Clear the fault of the angle, because somebody has checked it."""
         self._fault = ''
         self._index_position = None
 
     @property
-    def angle(self):
+    def angle(self) -> float | None:
         """Angle in rad of the last sample that was believed; None before the first."""
-        return None if self._position is None else self._angle(self._position)
+        return self._angle(self._position) if self._begun else None
 
-    def update(self, time, counter, index=0, latch=None):
+    def update(self, time: float, counter: int, index: int = 0,
+               latch: int | None = None) -> Reading:
         """
         Take one sample.
 
@@ -156,7 +160,7 @@ class Encoder:
         Reading
 
         """
-        if self._position is None or self._restarted:
+        if not self._begun or self._restarted:
             self._begin(time, counter)
             self._look_at_index(counter, index, latch)
             return self._reading(True, '')
@@ -178,9 +182,10 @@ class Encoder:
         self._look_at_index(counter, index, latch)
         return self._reading(True, '')
 
-    def _begin(self, time, counter):
+    def _begin(self, time: float, counter: int) -> None:
         if not self._restarted:
             self._position = self._wrap(counter)
+        self._begun = True
         self._counter = counter
         self._time = time
         self._index = None
@@ -189,41 +194,42 @@ class Encoder:
         self._history.clear()
         self._remember(time)
 
-    def _agrees_with_suspect(self, time, counter):
+    def _agrees_with_suspect(self, time: float, counter: int) -> bool:
         if self._suspect is None:
             return False
         since, suspect = self._suspect
         return abs(self._wrap(counter - suspect)) <= self._possible(time - since)
 
-    def _possible(self, duration):
+    def _possible(self, duration: float) -> float:
         """Return how many counts the arm can turn within `duration`, and one for rounding."""
         return self._maximum_speed * max(duration, 0.0) / abs(self._scale) + 1.0
 
-    def _wrap(self, difference):
+    def _wrap(self, difference: int) -> int:
         half = 1 << (self.counter_bits - 1)
         return (difference + half) % (2 * half) - half
 
-    def _remember(self, time):
+    def _remember(self, time: float) -> None:
         history = self._history
         history.append((time, self._position))
         while len(history) > 2 and history[1][0] <= time - self._window:
             history.popleft()
 
-    def _look_at_index(self, counter, index, latch):
+    def _look_at_index(self, counter: int, index: int, latch: int | None) -> None:
         if latch is None or index == self._index or self._index_use == 'ignore':
             return
         self._index = index
         self._at_index(self._position - self._wrap(counter - latch))
 
-    def _at_index(self, position):
+    def _at_index(self, position: int) -> None:
         """Compare or correct the position with the index pulse that came at `position`."""
-        first = self._index_position is None
+        expected, first = self._index_position, self._index_position is None
         if self._index_use == 'home':
-            self._index_position = round((self._index_angle - self._zero) / self._scale)
-        elif first:
-            self._index_position = position
+            expected = round((self._index_angle - self._zero) / self._scale)
+        elif expected is None:
+            expected = position
+        self._index_position = expected
         turn = self._counts_per_revolution
-        error = (position - self._index_position + turn // 2) % turn - turn // 2
+        error = (position - expected + turn // 2) % turn - turn // 2
         if self._index_use == 'home':
             self._move(-error)
             self._fault = ''
@@ -232,15 +238,15 @@ class Encoder:
                            'the angle ' + ('was put right' if self._index_use == 'home'
                                            else 'may be off') + '; check cable and coupling')
 
-    def _move(self, counts):
+    def _move(self, counts: int) -> None:
         self._position += counts
         self._history = collections.deque(
             (time, position + counts) for time, position in self._history)
 
-    def _angle(self, position):
+    def _angle(self, position: int) -> float:
         return self._zero + self._scale * position
 
-    def _reading(self, fresh, fault):
+    def _reading(self, fresh: bool, fault: str) -> Reading:
         (start, before), (end, now) = self._history[0], self._history[-1]
         velocity = self._scale * (now - before) / (end - start) if end > start else 0.0
         return Reading(self._angle(self._position), velocity, fresh, fault or self._fault)

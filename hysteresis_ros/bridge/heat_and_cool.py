@@ -55,18 +55,18 @@ class HeatAndCool:
 
     """
 
-    def __init__(self, voltage, heat_time, cool_time):
+    def __init__(self, voltage: float, heat_time: float, cool_time: float) -> None:
         if not (voltage > 0.0 and heat_time > 0.0 and cool_time > 0.0):
             raise ParameterError('heat and cool cycle: voltage and both times have to be positive')
         self._voltage = voltage
         self._times = {'heating': heat_time, 'cooling': cool_time}
         self._phase = 'heating'
-        self._begun = None          # time at which the phase began
+        self._begun: float | None = None    # time at which the phase began
         self._applied = 0.0         # how long the phase's voltage was really applied
-        self._last = None
-        self._still_since = None    # (time, angle)
+        self._last = 0.0
+        self._still_since = (0.0, 0.0)      # (time, angle)
 
-    def update(self, time, angle, applied):
+    def update(self, time: float, angle: float, applied: float) -> Phase:
         """
         Take one sample of telemetry.
 

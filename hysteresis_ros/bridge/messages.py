@@ -10,7 +10,7 @@ each; here they are read and written.
 
 from typing import NamedTuple
 
-from hysteresis_ros.bridge.protocol import decimal, integer, write_number
+from hysteresis_ros.bridge.protocol import decimal, Frame, integer, write_number
 from hysteresis_ros.errors import ProtocolError
 
 HELLO = 'hello'
@@ -65,7 +65,7 @@ class Identity(NamedTuple):
     counter_bits: int
     speed: float
 
-    def fields(self):
+    def fields(self) -> dict[str, str | int | float]:
         """
         Return the fields of the frame.
 
@@ -79,7 +79,7 @@ class Identity(NamedTuple):
         return fields
 
     @classmethod
-    def from_frame(cls, frame):
+    def from_frame(cls, frame: Frame) -> 'Identity':
         """
         Read a ``board`` frame.
 
@@ -145,12 +145,12 @@ class Telemetry(NamedTuple):
     duty: float
     enabled: bool
     faults: tuple = ()
-    index: int = 0
+    index: int = 0      # type: ignore[assignment]  # a tuple's method that nobody calls here
     latch: 'int | None' = None
     ambient: 'float | None' = None
     accepted: 'int | None' = None
 
-    def fields(self):
+    def fields(self) -> dict[str, str | int | float]:
         """
         Return the fields of the frame.
 
@@ -159,7 +159,8 @@ class Telemetry(NamedTuple):
         dict of str to str or int or float
 
         """
-        fields = {'time': self.time, 'counts': self.counts, 'index': self.index}
+        fields: dict[str, str | int | float] = {
+            'time': self.time, 'counts': self.counts, 'index': self.index}
         if self.latch is not None:
             fields['latch'] = self.latch
         fields.update(supply=write_number(self.supply, 3), duty=self.duty, on=self.enabled)
@@ -171,7 +172,7 @@ class Telemetry(NamedTuple):
         return fields
 
     @classmethod
-    def from_frame(cls, frame):
+    def from_frame(cls, frame: Frame) -> 'Telemetry':
         """
         Read a ``tele`` frame.
 

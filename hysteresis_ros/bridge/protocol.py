@@ -14,16 +14,21 @@ Everything else is a bad line: counted, never acted on. `docs/protocol.md` is th
 """
 
 import binascii
+from collections.abc import Callable
 import math
 import numbers
 import re
-from typing import Mapping, NamedTuple, Union
+from typing import Mapping, NamedTuple, TypeVar, Union
 
 from hysteresis_ros.errors import ProtocolError
 
 VERSION = 1
 MAX_LINE = 192
 SEQUENCE_LIMIT = 1 << 16
+
+Number = TypeVar('Number', int, float)
+# What a frame can carry: text without spaces, and numbers.
+Fields = Mapping[str, Union[str, int, float]]
 
 _BODY = re.compile(rb'([a-z]+) ([0-9]{1,5})((?: [a-z_]+=[!-)+-~]+)*)')
 _WORD = re.compile(r'[a-z]+')
@@ -83,7 +88,7 @@ class BadLine(NamedTuple):
 Line = Union[Frame, Remark, BadLine]
 
 
-def crc16(data):
+def crc16(data: bytes) -> int:
     """
     CRC-16/CCITT-FALSE of some bytes.
 
@@ -101,7 +106,7 @@ def crc16(data):
     return binascii.crc_hqx(data, 0xFFFF)
 
 
-def encode(kind, sequence, fields=None):
+def encode(kind: str, sequence: int, fields: Fields | None = None) -> bytes:
     """
     Write a frame as the bytes that go over the wire.
 
@@ -144,7 +149,7 @@ def encode(kind, sequence, fields=None):
     return line
 
 
-def write_number(value, decimals=5):
+def write_number(value: float, decimals: int = 5) -> str:
     """
     Write a number so that a microcontroller without printf or scanf can read it.
 
@@ -174,7 +179,7 @@ def write_number(value, decimals=5):
     return text
 
 
-def integer(frame, key, default=None):
+def integer(frame: Frame, key: str, default: int | None = None) -> int:
     """
     Read a whole number from a frame.
 
@@ -200,7 +205,7 @@ def integer(frame, key, default=None):
     return _number(frame, key, default, _INTEGER, int, 'a whole number')
 
 
-def decimal(frame, key, default=None):
+def decimal(frame: Frame, key: str, default: float | None = None) -> float:
     """
     Read a decimal number from a frame.
 
@@ -227,7 +232,8 @@ def decimal(frame, key, default=None):
     return _number(frame, key, default, _DECIMAL, float, 'a decimal number')
 
 
-def _number(frame, key, default, form, convert, wanted):
+def _number(frame: Frame, key: str, default: Number | None, form: re.Pattern[str],
+            convert: Callable[[str], Number], wanted: str) -> Number:
     text = frame.fields.get(key)
     if text is None:
         if default is None:
@@ -238,7 +244,7 @@ def _number(frame, key, default, form, convert, wanted):
     return convert(text)
 
 
-def parse_line(line):
+def parse_line(line: bytes) -> Line | None:
     """
     Read one line, without its newline.
 
@@ -276,7 +282,7 @@ def parse_line(line):
     return Frame(kind.decode('ascii'), int(sequence), fields)
 
 
-def _printable(data, length=60):
+def _printable(data: bytes, length: int = 60) -> str:
     text = data[:length].decode('ascii', 'backslashreplace')
     return ''.join(c if c.isprintable() else f'\\x{ord(c):02x}' for c in text)[:length]
 
@@ -297,14 +303,14 @@ class Decoder:
 
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.frames = 0
         self.remarks = 0
         self.bad_lines = 0
-        self.last_bad = None
+        self.last_bad: BadLine | None = None
         self._line = bytearray()
 
-    def feed(self, data):
+    def feed(self, data: bytes) -> list[Line]:
         """
         Take bytes as they come from the port.
 
@@ -319,7 +325,7 @@ class Decoder:
             What these bytes completed, in order.
 
         """
-        found = []
+        found: list[Line] = []
         *ends, tail = data.split(b'\n')
         for piece in ends:
             self._append(piece)
@@ -329,10 +335,11 @@ class Decoder:
         self._append(tail)
         return found
 
-    def _append(self, piece):
+    def _append(self, piece: bytes) -> None:
         self._line += piece[:MAX_LINE - len(self._line)]
 
-    def _take(self):
+    def _take(self) -> Line | None:
+        line: Line | None
         if len(self._line) >= MAX_LINE:
             line = BadLine(f'longer than {MAX_LINE} bytes', _printable(bytes(self._line)), '')
         else:

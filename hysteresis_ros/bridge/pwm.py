@@ -68,7 +68,7 @@ class Pwm:
     maximum_voltage: float = 6.0
     maximum_duty: float = 1.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Check the parameters."""
         if self.law not in LAWS:
             raise ParameterError(f'pwm_law {self.law!r}: use one of {", ".join(LAWS)}')
@@ -79,7 +79,7 @@ class Pwm:
         if not 0.0 < self.maximum_duty <= 1.0:
             raise ParameterError(f'maximum_duty {self.maximum_duty:g}: above 0 and at most 1')
 
-    def check(self, voltage):
+    def check(self, voltage: float) -> None:
         """
         Refuse a voltage that must never reach the board.
 
@@ -100,7 +100,7 @@ class Pwm:
             raise RangeError(f'voltage setpoint {voltage:g} V refused: the limits are '
                              f'{self.minimum_voltage:g} to {self.maximum_voltage:g} V')
 
-    def drive(self, voltage, supply):
+    def drive(self, voltage: float, supply: float) -> Drive:
         """
         Find the duty for a voltage.
 
@@ -137,7 +137,7 @@ class Pwm:
                      f'{voltage:g} V asked, but a supply of {supply:.3g} V with duty '
                      f'{self.maximum_duty:g} gives {reachable:.3g} V')
 
-    def voltage(self, duty, supply):
+    def voltage(self, duty: float, supply: float) -> float:
         """
         Find the voltage that a duty stands for.
 

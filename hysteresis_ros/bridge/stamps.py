@@ -19,12 +19,12 @@ class RealStamps:
     the offset between the clocks, and all others get their stamps from it.
     """
 
-    def __init__(self):
-        self._offset = None
+    def __init__(self) -> None:
+        self._offset: float | None = None
         self._last_time = 0.0
         self._last_stamp = -float('inf')
 
-    def stamp(self, time, now):
+    def stamp(self, time: float, now: float) -> float:
         """
         Translate a board time.
 
@@ -69,13 +69,13 @@ class SimulatedStamps:
 
     """
 
-    def __init__(self, start, speed):
+    def __init__(self, start: float, speed: float) -> None:
         self._start = start
         self._speed = speed
         self._last_stamp = start
-        self._last_wall = None
+        self._last_wall: float | None = None
 
-    def stamp(self, time, wall):
+    def stamp(self, time: float, wall: float) -> float:
         """
         Translate a board time.
 
@@ -95,7 +95,7 @@ class SimulatedStamps:
         self._last_stamp = max(self._start + time, self._last_stamp + SMALLEST_DT)
         return self._last_stamp
 
-    def idle(self, wall):
+    def idle(self, wall: float) -> float:
         """
         Let the clock go on without the board.
 
@@ -110,5 +110,5 @@ class SimulatedStamps:
             The stamp of now.
 
         """
-        return self.stamp(self._last_stamp - self._start
-                          + self._speed * (wall - self._last_wall), wall)
+        passed = 0.0 if self._last_wall is None else wall - self._last_wall
+        return self.stamp(self._last_stamp - self._start + self._speed * passed, wall)

@@ -3,21 +3,26 @@
 """What several commands share: reading files, progress, writing results."""
 
 import argparse
+from collections.abc import Iterable, Mapping, Sequence
 import json
 import sys
+from typing import Any, TextIO, TypeVar
 
-from hysteresis_ros.atomic import write_text
+from hysteresis_ros.atomic import AnyPath, write_text
 from hysteresis_ros.cli.outputs import InputPath, OutputFile, OutputFileOrStdout
-from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.measurements import read_measurement, settled_rows
+from hysteresis_ros.measurements import Measurement, read_measurement
+
+Item = TypeVar('Item')
+# What `ArgumentParser.add_subparsers` returns; argparse has no public name for it.
+Subparsers = argparse._SubParsersAction
 
 
-def one_line(text):
+def one_line(text: object) -> str:
     """Return text as one line that cannot move a terminal's cursor or set its colours."""
     return ''.join(c if c.isprintable() else ' ' for c in ' '.join(str(text).split()))
 
 
-def numbers(text):
+def numbers(text: str) -> list[int]:
     """
     Read a list of trials: `0,2,5-7`.
 
@@ -35,7 +40,7 @@ def numbers(text):
         If it is no such list.
 
     """
-    found = []
+    found: list[int] = []
     try:
         for part in text.split(','):
             low, _, high = part.strip().partition('-')
@@ -49,7 +54,7 @@ def numbers(text):
     return found
 
 
-def add_data(parser, name='--data', required=True):
+def add_data(parser: argparse.ArgumentParser, name: str = '--data', required: bool = True) -> None:
     """Add the option that names measurements, and how bags are read."""
     parser.add_argument(name, nargs='+', type=InputPath, required=required, metavar='FILE',
                         help='CSV files or rosbag2 folders')
@@ -57,31 +62,32 @@ def add_data(parser, name='--data', required=True):
                         help='which arm to take from a bag that recorded several')
 
 
-def add_model(parser):
+def add_model(parser: argparse.ArgumentParser) -> None:
     """Add the option that names the model."""
     parser.add_argument('--model', type=InputPath, required=True, metavar='M.yaml',
                         help='an identified model')
 
 
-def add_json(parser):
+def add_json(parser: argparse.ArgumentParser) -> None:
     """Add the option that writes the result for programs."""
     parser.add_argument('--json', type=OutputFileOrStdout, metavar='J.json',
                         help='write what is printed for programs; - for standard output')
 
 
-def add_settled(parser):
+def add_settled(parser: argparse.ArgumentParser) -> None:
     """Add the option that reduces continuous runs to their settled states."""
     parser.add_argument('--settled', action='store_true',
                         help='of a continuous run take only the ends of its holds')
 
 
-def add_report(parser):
+def add_report(parser: argparse.ArgumentParser) -> None:
     """Add the option that writes a page."""
     parser.add_argument('--report', type=OutputFile, metavar='R.html',
                         help='write one page with all pictures')
 
 
-def read_all(paths, namespace=None, settled=False):
+def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
+             settled: bool = False) -> list[Measurement]:
     """
     Read measurements.
 
@@ -102,20 +108,10 @@ def read_all(paths, namespace=None, settled=False):
         If one cannot be read, or has no settled states.
 
     """
-    found = []
-    for path in progress(paths, 'reading'):
-        measurement = read_measurement(path, namespace)
-        if settled:
-            reduced = settled_rows(measurement)
-            if reduced is None:
-                raise MeasurementError(f'{path}: the drive is not held for 20 s at a time, so '
-                                       'there are no settled states; leave --settled out')
-            measurement = reduced
-        found.append(measurement)
-    return found
+    return [read_measurement(path, namespace, settled) for path in progress(paths, 'reading')]
 
 
-def progress(items, what, total=None):
+def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iterable[Item]:
     """
     Iterate with a bar on a terminal, silently elsewhere.
 
@@ -151,24 +147,24 @@ class Steps:
 
     """
 
-    def __init__(self, stream=None):
+    def __init__(self, stream: TextIO | None = None) -> None:
         self.stream = stream or sys.stderr
         self.shown = self.stream.isatty()
 
-    def __call__(self, what):
+    def __call__(self, what: str) -> None:
         """Replace the line by another part's name."""
         if self.shown:
             self.stream.write(f'\r\x1b[K{one_line(what)} ...')
             self.stream.flush()
 
-    def clear(self):
+    def clear(self) -> None:
         """Leave an empty line behind."""
         if self.shown:
             self.stream.write('\r\x1b[K')
             self.stream.flush()
 
 
-def write_json(path, content):
+def write_json(path: str, content: Mapping[str, Any]) -> None:
     """
     Write a result for programs.
 
@@ -187,6 +183,6 @@ def write_json(path, content):
         write_text(path, text + '\n')
 
 
-def say(args, text):
+def say(args: argparse.Namespace, text: str) -> None:
     """Print for a person, unless standard output is a program's."""
     print(text, file=sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout)

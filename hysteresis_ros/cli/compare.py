@@ -2,17 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis compare`: model against measurement."""
 
+from __future__ import annotations
+
+import argparse
 from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import (
     add_data, add_json, add_model, add_report, add_settled, one_line, read_all, say, Steps,
-    write_json)
+    Subparsers, write_json)
 from hysteresis_ros.cli.outputs import OutputFolder
 
+if TYPE_CHECKING:
+    from hysteresis_ros.comparison.compare import Comparison
 
-def add_parser(subparsers):
+
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'compare', help='model against measurement: errors, where it fails, plots',
@@ -29,7 +36,7 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.comparison.compare import compare
     from hysteresis_ros.model import MuscleModel
@@ -47,12 +54,12 @@ def run(args):
     if args.plots:
         Path(args.plots).mkdir(parents=True, exist_ok=True)
     if args.json:
-        write_json(args.json, comparison.to_json())
+        write_json(args.json, comparison.to_dict())
     if args.report or args.plots:
         draw(args, comparison, steps)
 
 
-def draw(args, comparison, steps):
+def draw(args: argparse.Namespace, comparison: Comparison, steps: Steps) -> None:
     """Write the page and the pictures that were asked for."""
     from hysteresis_ros.report.comparison_page import comparison_page, rendered
     from hysteresis_ros.report.plots import figures

@@ -2,18 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis demo`: the whole system on the simulated arm, from the bench to the comparison."""
 
+from __future__ import annotations
+
 import argparse
+from collections.abc import Mapping
 import dataclasses
 from pathlib import Path
 import shutil
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from hysteresis_ros.atomic import write_bytes, write_text
-from hysteresis_ros.cli.common import add_json, progress, say, write_json
+from hysteresis_ros.atomic import AnyPath, write_bytes, write_text
+from hysteresis_ros.cli.common import add_json, progress, say, Subparsers, write_json
 from hysteresis_ros.cli.outputs import OutputFolder
 from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.measurements import settled_rows
+from hysteresis_ros.measurements import Measurement, settled_rows
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import MuscleModel
+
+# Angles of the arm [rad], shape (n,), by the name of the sequence.
+Angles = dict[str, np.ndarray]
 
 VALUES = 40
 # Says that the demo may remove its own entries of this folder; others are never touched.
@@ -26,7 +36,7 @@ SETTLED_HOLD = 30.0
 PASSING_HOLD, PASSING_SPEED = 6.0, 12.0
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'demo', help='the whole system on the simulated arm',
@@ -77,19 +87,19 @@ class Pace:
     speed: float
     settled: bool
 
-    def rows(self, bag):
+    def rows(self, bag: Measurement) -> Measurement:
         """Return what is compared and diagnosed of a recording."""
         return (settled_rows(bag) or bag) if self.settled else bag
 
 
-def pace_of(args, hidden) -> Pace:
+def pace_of(args: argparse.Namespace, hidden: str | None) -> Pace:
     """Return a pace at which the hidden effect matters."""
     if hidden in PASSING:
         return Pace(PASSING_HOLD, min(args.speed, PASSING_SPEED), False)
     return Pace(SETTLED_HOLD, args.speed, True)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.comparison.compare import compare
     from hysteresis_ros.measurements import read_measurement
@@ -104,7 +114,7 @@ def run(args):
     prepare(folder)
     model = bench_model(args, folder)
     sequences = target_sequences(model, args)
-    result = {'runs': []}
+    result: dict[str, Any] = {'runs': []}
     runs = drive(args, folder / 'run', sequences, folder / 'model.yaml', hidden, pace)
     result['runs'].append(summary('the identified model', sequences, runs))
     linear = linear_runs(args, model, sequences, hidden, pace)
@@ -135,7 +145,7 @@ def prepare(folder: Path) -> None:
             entry.unlink(missing_ok=True)
 
 
-def bench_model(args, folder):
+def bench_model(args: argparse.Namespace, folder: Path) -> MuscleModel:
     """Identify the simulated bench and save the model."""
     from hysteresis_ros.bicep import BicepGeometry
     from hysteresis_ros.identification.bench import identify
@@ -158,7 +168,7 @@ def bench_model(args, folder):
     return model
 
 
-def drawn(args):
+def drawn(args: argparse.Namespace) -> str | None:
     """Return the effect to hide, or None."""
     from hysteresis_ros.laboratory.hidden_physics import EFFECTS
 
@@ -170,7 +180,7 @@ def drawn(args):
     return str(np.random.default_rng([args.seed, 77]).choice([*SETTLED, *PASSING]))
 
 
-def target_sequences(model, args):
+def target_sequences(model: MuscleModel, args: argparse.Namespace) -> Angles:
     """Return the sinusoidal and the random sequence [rad], inside what the muscle reaches."""
     from hysteresis_ros.measurements.table import Measurement
 
@@ -185,7 +195,8 @@ def target_sequences(model, args):
     return {'sinusoidal': sinusoid, 'random': chance.uniform(low, high, args.values)}
 
 
-def drive(args, folder, sequences, model_file, hidden, pace):
+def drive(args: argparse.Namespace, folder: Path, sequences: Angles, model_file: AnyPath,
+          hidden: str | None, pace: Pace) -> Angles:
     """Drive the arm with the three nodes and return the angles reached, by sequence."""
     try:
         from hysteresis_ros.nodes.session import record
@@ -207,22 +218,25 @@ def drive(args, folder, sequences, model_file, hidden, pace):
     return dict(zip(sequences, reached))
 
 
-def linear_runs(args, model, sequences, hidden, pace):
+def linear_runs(args: argparse.Namespace, model: MuscleModel, sequences: Angles,
+                hidden: str | None, pace: Pace) -> Angles:
     """Apply the linear model's voltages to the same simulated arm, without nodes."""
     from hysteresis_ros.laboratory.plant import Plant
 
-    geometry = model.require_geometry()
+    geometry, line = model.require_geometry(), model.linear
+    if line is None:
+        raise ParameterError('the model has no linear part; identify it again')
     low, high = model.ranges['voltage']
     reached = {}
     for name, targets in sequences.items():
-        voltages = np.clip(model.linear.drive_for_length(
+        voltages = np.clip(line.drive_for_length(
             geometry.length(targets), geometry.force(targets)), low, high)
         plant = Plant(args.seed, {hidden: args.strength} if hidden else {})
         reached[name] = plant.arm_trial(voltages, hold=pace.hold)['angle']
     return reached
 
 
-def summary(name, sequences, runs):
+def summary(name: str, sequences: Angles, runs: Angles) -> dict[str, Any]:
     """Errors of one way of driving [deg]: Eqs. 23 and 24 without the division by the range."""
     rows = {}
     for sequence, targets in sequences.items():
@@ -235,7 +249,7 @@ def summary(name, sequences, runs):
 PAPER = {'sinusoidal': (1.8, 0.8, 3.4, 1.7), 'random': (1.6, 1.1, 4.2, 2.9)}
 
 
-def table(result):
+def table(result: Mapping[str, Any]) -> str:
     """Return Table I's rows for the arm."""
     from hysteresis_ros.comparison.compare import layout
 
@@ -249,7 +263,9 @@ def table(result):
     return '\n'.join(layout(rows))
 
 
-def find_and_extend(args, folder, model, sequences, data, hidden, pace, result):
+def find_and_extend(args: argparse.Namespace, folder: Path, model: MuscleModel, sequences: Angles,
+                    data: list[Measurement], hidden: str, pace: Pace,
+                    result: dict[str, Any]) -> Angles | None:
     """Diagnose the recording, extend the model, drive again; return the angles reached then."""
     from hysteresis_ros.cli.diagnose import to_text
     from hysteresis_ros.diagnosis.diagnose import diagnose
@@ -272,7 +288,8 @@ def find_and_extend(args, folder, model, sequences, data, hidden, pace, result):
     return again
 
 
-def draw(path, sequences, runs, linear, again, pace):
+def draw(path: Path, sequences: Angles, runs: Angles, linear: Angles, again: Angles | None,
+         pace: Pace) -> None:
     """Save the picture: targets and angles reached, and the errors."""
     from hysteresis_ros.report.drawing import new_figure, png
 

@@ -2,14 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis diagnose`: which physical effect the model is missing."""
 
+from __future__ import annotations
+
+import argparse
+
+from typing import TYPE_CHECKING
+
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, write_json)
+    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, Subparsers,
+    write_json)
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.verdict import Diagnosis
 
 UNITS = {'angle': (57.29577951308232, 'deg'), 'length': (1e3, 'mm'), 'strain': (100.0, '%'),
          'force': (1.0, 'N')}
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'diagnose', help='which physical effect is missing',
@@ -28,26 +38,23 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
-    from hysteresis_ros.diagnosis.diagnose import diagnose
-    from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.api import diagnose, load_model
 
-    model = MuscleModel.load(args.model)
+    model = load_model(args.model)
     measurements = read_all(args.data, args.namespace, args.settled)
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed,
                      progress=lambda items, total: progress(items, 'effects', total))
     say(args, to_text(found, measurements[-1].response))
     if args.json:
-        from hysteresis_ros.comparison.compare import compare
-        where = compare(model, measurements).to_json()['where']
-        write_json(args.json, {**found.to_json(), 'where': where})
+        write_json(args.json, found.to_dict())
     if args.report:
         from hysteresis_ros.report.diagnosis_page import write_diagnosis
         write_diagnosis(args.report, model, measurements, found, args.model)
 
 
-def to_text(found, response):
+def to_text(found: Diagnosis, response: str) -> str:
     """Return the diagnosis for a terminal."""
     from hysteresis_ros.comparison.compare import layout
     from hysteresis_ros.report.words import parameters_in_words, verdict_in_words

@@ -2,13 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis effects`: the catalogue of physical effects."""
 
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
 import shutil
 import textwrap
+from typing import Any, TYPE_CHECKING
 
-from hysteresis_ros.cli.common import add_json, say, write_json
+from hysteresis_ros.cli.common import add_json, say, Subparsers, write_json
+
+if TYPE_CHECKING:
+    from hysteresis_ros.effects import Effect
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'effects', help='the catalogue of physical effects',
@@ -18,7 +26,7 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.effects import catalogue, effect_class
 
@@ -34,7 +42,7 @@ def run(args):
         write_json(args.json, content)
 
 
-def described(effect):
+def described(effect: type[Effect]) -> dict[str, Any]:
     """Return all that is known of an effect as plain types."""
     return {
         'effect': effect.id, 'stage': effect.stage, 'sentence': effect.sentence,
@@ -46,10 +54,11 @@ def described(effect):
         'invertible': effect.invertible}
 
 
-def listed(known):
+def listed(known: Mapping[str, type[Effect]]) -> str:
     """Return the catalogue, one line an effect, in the order of the stages."""
     width = max(len(name) for name in known)
-    lines, stage = [], None
+    lines: list[str] = []
+    stage = None
     for name, effect in known.items():
         if effect.stage != stage:
             stage = effect.stage
@@ -58,7 +67,7 @@ def listed(known):
     return '\n'.join([*lines, '', '`hysteresis effects NAME` explains one.'])
 
 
-def explained(effect):
+def explained(effect: type[Effect]) -> str:
     """Return all that is known of an effect, for a terminal."""
     columns = min(shutil.get_terminal_size().columns, 100)
     lines = [f'{effect.id} ({effect.stage})', '', *textwrap.wrap(effect.sentence, columns), '']

@@ -2,13 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis extend`: add effects to a model and see the error fall."""
 
+from __future__ import annotations
+
+import argparse
+
+from typing import TYPE_CHECKING
+
 from hysteresis_ros.cli.common import (
-    add_json, add_model, add_report, add_settled, read_all, say, write_json)
+    add_json, add_model, add_report, add_settled, read_all, say, Subparsers, write_json)
 from hysteresis_ros.cli.diagnose import UNITS
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.extend import Extension
 
-def add_parser(subparsers):
+
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'extend', help='add effects, fit them, and show the error before and after',
@@ -31,7 +40,7 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.diagnosis.extend import extend
     from hysteresis_ros.model import MuscleModel
@@ -45,13 +54,13 @@ def run(args):
     say(args, to_text(extension, train[0].response))
     say(args, f'\nWritten to {args.output}')
     if args.json:
-        write_json(args.json, extension.to_json())
+        write_json(args.json, extension.to_dict())
     if args.report:
         from hysteresis_ros.report.diagnosis_page import write_extension
         write_extension(args.report, model, extension, train, test, args.output)
 
 
-def to_text(extension, response):
+def to_text(extension: Extension, response: str) -> str:
     """Return the gain for a terminal."""
     from hysteresis_ros.report.words import parameters_in_words
 

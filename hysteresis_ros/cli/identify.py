@@ -2,15 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis identify`: from bench tables to a model."""
 
+from __future__ import annotations
+
+import argparse
+
+from typing import TYPE_CHECKING
+
 from hysteresis_ros.cli.common import (
-    add_json, numbers, progress, read_all, say, Steps, write_json)
+    add_json, numbers, progress, say, Steps, Subparsers, write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
-from hysteresis_ros.errors import MeasurementError, ParameterError
+from hysteresis_ros.errors import ParameterError
+
+if TYPE_CHECKING:
+    from hysteresis_ros.identification.bench import Identified
 
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'identify', help='fit a model to bench tables',
@@ -40,68 +49,35 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
-    from hysteresis_ros.bicep import BicepGeometry
-    from hysteresis_ros.identification.bench import identify
+    from hysteresis_ros.api import identify
 
     if args.force is None and args.length is None:
         raise ParameterError('nothing to identify; give --length, --force or both')
     steps = Steps()
-    geometry = BicepGeometry.from_yaml(args.geometry) if args.geometry else None
-    force = table(args.force, ('force',))
-    length = table(args.length, ('length', 'strain'))
     steps('identifying')
-    found = identify(length, force, force_trials=args.force_trials,
-                     length_trials=args.length_trials, geometry=geometry, levels=args.levels,
-                     operator=args.operator, anchored=args.anchored)
+    found = identify(args.length, args.force, force_trials=args.force_trials,
+                     length_trials=args.length_trials, geometry=args.geometry,
+                     levels=args.levels, operator=args.operator, anchored=args.anchored,
+                     effects=args.effects,
+                     progress=lambda items, total: progress(items, 'effects', total))
     steps.clear()
-    model, added = found.model, []
-    if args.effects != 'none':
-        model, added = with_effects(args, model, force, length)
-    model.save(args.output)
-    say(args, report(model, found, added))
+    found.model.save(args.output)
+    say(args, report(found))
     say(args, f'\nWritten to {args.output}')
     if args.json:
-        write_json(args.json, {
-            'model': args.output, 'kind': model.kind, 'metrics': model.metrics,
-            'effects': [effect.to_dict() for effect in model.effects]})
+        write_json(args.json, {'model': args.output, **found.to_dict()})
 
 
-def table(path, responses):
-    """Read a bench table and check that it is of the kind that its option asks for."""
-    if path is None:
-        return None
-    measurement, = read_all([path])
-    if measurement.response not in responses:
-        swapped = measurement.response in ('force', 'length', 'strain')
-        raise MeasurementError(
-            f'{path}: the table measures {measurement.response}, but {" or ".join(responses)} is '
-            'needed here; ' + ('are --force and --length swapped?' if swapped
-                               else 'identify takes bench tables'))
-    return measurement
-
-
-def with_effects(args, model, force, length):
-    """Add effects to the bench model, fitted to the trials that are fitted."""
-    from hysteresis_ros.diagnosis.bench_effects import add_effects
-
-    if length is None:
-        raise ParameterError('--effects needs a length table, in which effects of the load show')
-    names = None if args.effects == 'auto' else args.effects.split(',')
-    return add_effects(model, length, force, names, length_trials=args.length_trials,
-                       force_trials=args.force_trials, progress=lambda items, total: progress(
-                           items, 'effects', total))
-
-
-def report(model, found, added):
+def report(found: Identified) -> str:
     """Return the rows of Table I and what the fits say, for a terminal."""
     from hysteresis_ros.comparison.compare import layout
     from hysteresis_ros.report.words import parameters_in_words
 
     rows = [['Table I', 'mean, model', 'linear', 'std, model', 'linear', 'rows']]
     for name, letter in (('force', 'F'), ('length', 'L')):
-        for part, values in model.metrics.get(name, {}).items():
+        for part, values in found.model.metrics.get(name, {}).items():
             if not isinstance(values, dict) or 'model' not in values:
                 continue
             cells = [values[of][key] for key in ('mean_percent', 'std_percent')
@@ -110,10 +86,9 @@ def report(model, found, added):
                 '-' if cell is None else f'{cell:.2f} %' for cell in cells), str(values['rows'])])
     lines = layout(rows)
     for name, fit in (('H1', found.force_fit), ('H2', found.length_fit)):
-        # With effects H2 was fitted once more; what its first fit said no longer holds.
-        if fit is not None and not (added and name == 'H2'):
+        if fit is not None:
             lines.append(f'{name}: {len(fit.weights)} weights, rank {fit.rank}, '
                          f'{len(fit.never_excited)} cells never excited, bias {fit.bias:.4g}')
-    for effect in added:
+    for effect in found.model.effects:
         lines.append(f'+ {effect.id}: {parameters_in_words(effect.to_dict()["parameters"])}')
     return '\n'.join(lines)

@@ -2,15 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis invert`: voltages for a reference (Eqs. 12, 14, 15, 21 and 22)."""
 
-from hysteresis_ros.cli.common import add_model
+from __future__ import annotations
+
+import argparse
+
+from collections.abc import Mapping
+
+from typing import TYPE_CHECKING
+
+from hysteresis_ros.cli.common import add_model, Subparsers
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.errors import MeasurementError, ParameterError, RangeError
 import numpy as np
 
+if TYPE_CHECKING:
+    from hysteresis_ros.model import Controller, MuscleModel, Setpoint
+
 ROUNDING = 1e-6
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'invert', help='voltages for a reference, keeping the memory along each trial',
@@ -25,7 +36,7 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.measurements import read_reference, write_csv
     from hysteresis_ros.model import MuscleModel
@@ -41,7 +52,8 @@ def run(args):
     print(f'{args.output}: {len(drive)} rows with {model.drive}{reached}')
 
 
-def invert(model, reference, method='preisach'):
+def invert(model: MuscleModel, reference: Mapping[str, np.ndarray],
+           method: str = 'preisach') -> tuple[np.ndarray, np.ndarray]:
     """
     Find the drive for every row of a reference.
 
@@ -90,7 +102,7 @@ def invert(model, reference, method='preisach'):
     return drive, saturated
 
 
-def kind_of(model, reference):
+def kind_of(model: MuscleModel, reference: Mapping[str, np.ndarray]) -> str:
     """Tell from the columns what is asked for: 'angle', 'length' or 'force'."""
     if 'angle' in reference:
         model.require_geometry()
@@ -107,7 +119,8 @@ def kind_of(model, reference):
         f'the reference has no column that the model knows: force, {model.response} or angle')
 
 
-def setpoint(controller, model, reference, kind, row):
+def setpoint(controller: Controller, model: MuscleModel, reference: Mapping[str, np.ndarray],
+             kind: str, row: int) -> Setpoint:
     """Return the controller's answer to one row."""
     if kind == 'force':
         return controller.force_setpoint(float(reference['force'][row]))
@@ -123,7 +136,8 @@ def setpoint(controller, model, reference, kind, row):
         ambient=float('nan') if ambient is None else float(ambient[row]))
 
 
-def invert_linear(model, reference, kind):
+def invert_linear(model: MuscleModel, reference: Mapping[str, np.ndarray],
+                  kind: str) -> tuple[np.ndarray, np.ndarray]:
     """Find the drive by the linear model (Eq. 15); as `invert`."""
     if model.linear is None:
         raise ParameterError('the model has no linear part; identify it again')

@@ -3,9 +3,11 @@
 """The command line `hysteresis`: finds the command, reports errors in one line."""
 
 import argparse
+from collections.abc import Sequence
 import importlib.util
 import os
 import sys
+from typing import TextIO
 import warnings
 
 from hysteresis_ros import __version__
@@ -22,7 +24,7 @@ PACKAGE = 'hysteresis_ros'
 DONE, FAILED, INTERRUPTED = 0, 1, 130
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
     """
     Run one command.
 
@@ -66,7 +68,7 @@ def main(arguments=None):
             return INTERRUPTED
 
 
-def build_parser(arguments):
+def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     """
     Return the parser; only the command that is called is imported.
 
@@ -94,7 +96,7 @@ def build_parser(arguments):
     return parser
 
 
-def described(error):
+def described(error: BaseException) -> str:
     """Return what an error says; for one of the system the file comes first."""
     if isinstance(error, IsADirectoryError) and error.filename:
         return f'{error.filename}: is a folder; name a file'
@@ -103,7 +105,8 @@ def described(error):
     return str(error) or type(error).__name__
 
 
-def show_warning(message, category, filename, lineno, file=None, line=None):
+def show_warning(message: Warning | str, category: type[Warning], filename: str, lineno: int,
+                 file: TextIO | None = None, line: str | None = None) -> None:
     """Print a warning in one line; ours without the place in the code."""
     where = '' if issubclass(category, MeasurementWarning) else f'{filename}:{lineno}: '
     print(f'hysteresis: warning: {one_line(where + str(message))}', file=sys.stderr)

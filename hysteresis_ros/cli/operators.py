@@ -2,11 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis operators`: which operator describes a muscle best, and what it costs."""
 
-from hysteresis_ros.cli.common import add_json, progress, say, Steps, write_json
+from __future__ import annotations
+
+import argparse
+
+from typing import TYPE_CHECKING
+
+from hysteresis_ros.cli.common import add_json, progress, say, Steps, Subparsers, write_json
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
+if TYPE_CHECKING:
+    from hysteresis_ros.identification.choice import Choice
 
-def add_parser(subparsers):
+
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'operators', help='operators side by side on held-out trials',
@@ -23,21 +32,21 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
-    from hysteresis_ros.cli.identify import table
+    from hysteresis_ros.api import bench_table
     from hysteresis_ros.identification.choice import compare_operators
 
     steps = Steps()
     steps('reading')
-    force = table(args.force, ('force',))
-    length = table(args.length, ('length', 'strain'))
+    force = None if args.force is None else bench_table(args.force, 'force')
+    length = bench_table(args.length, 'length')
     steps.clear()
     choice = compare_operators(length, force, progress=lambda items, total: progress(
         items, 'operators', total))
     say(args, report(choice))
     if args.json:
-        write_json(args.json, {**choice.to_json(), 'advice': advice(choice)})
+        write_json(args.json, {**choice.to_dict(), 'advice': advice(choice)})
     if args.plot:
         from hysteresis_ros.atomic import write_bytes
         from hysteresis_ros.report.choice_plot import choice_figure
@@ -45,7 +54,7 @@ def run(args):
         write_bytes(args.plot, png(choice_figure(choice)))
 
 
-def report(choice):
+def report(choice: Choice) -> str:
     """
     Return the table and the advice for a terminal.
 
@@ -72,12 +81,12 @@ def report(choice):
     return '\n'.join([*lines, '', advice(choice)])
 
 
-def percent(error, choice):
+def percent(error: float, choice: Choice) -> str:
     """Return an error as a share of the response's range."""
     return f'{100.0 * error / choice.span:.2f} %'
 
 
-def advice(choice):
+def advice(choice: Choice) -> str:
     """Return which operator to take, in one line."""
     best, simplest = choice.best, choice.simplest
     if best is simplest:

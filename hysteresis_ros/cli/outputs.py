@@ -81,7 +81,7 @@ def given(args: argparse.Namespace, kind: type) -> Iterator[Given]:
     """Yield the paths of one kind that were given."""
     for name, value in vars(args).items():
         for path in value if isinstance(value, list) else [value]:
-            if isinstance(path, kind):
+            if isinstance(path, str) and isinstance(path, kind):
                 yield Given('--' + name.replace('_', '-'), path)
 
 

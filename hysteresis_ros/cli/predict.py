@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hysteresis predict`: the response to a recording's inputs."""
 
-from hysteresis_ros.cli.common import add_data, add_model, read_all
+import argparse
+
+from hysteresis_ros.cli.common import add_data, add_model, read_all, Subparsers
 from hysteresis_ros.cli.outputs import OutputFile
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'predict', help="simulate the response to a recording's inputs",
@@ -20,7 +22,7 @@ def add_parser(subparsers):
     return parser
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.errors import ParameterError
     from hysteresis_ros.measurements import write_csv

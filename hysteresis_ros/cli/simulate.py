@@ -5,6 +5,7 @@
 import argparse
 import math
 
+from hysteresis_ros.cli.common import Subparsers
 from hysteresis_ros.cli.outputs import OutputFolder
 
 DESCRIPTION = """\
@@ -13,7 +14,7 @@ models, and writes the tables that a user would have. No file says what was hidd
 """
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'simulate', help='measurements of the virtual laboratory', description=DESCRIPTION)
@@ -31,7 +32,7 @@ def add_parser(subparsers):
     return parser
 
 
-def effect(text):
+def effect(text: str) -> tuple[str, float]:
     """Read `NAME` or `NAME=strength`."""
     name, given, strength = text.partition('=')
     try:
@@ -43,14 +44,14 @@ def effect(text):
     return name, value
 
 
-def seed(text):
+def seed(text: str) -> int:
     """Read a number that can start a random sequence."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f'{text!r} is no whole number from 0 up')
     return int(text)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.laboratory.experiments import write_experiment
 

@@ -3,13 +3,15 @@
 """`hysteresis table1`: the paper's experiment in the virtual laboratory, beside its Table I."""
 
 import argparse
+from collections.abc import Mapping
+from typing import Any
 
-from hysteresis_ros.cli.common import add_json, progress, say, write_json
+from hysteresis_ros.cli.common import add_json, progress, say, Subparsers, write_json
 
 HEADERS = {'two-stage': 'two-stage', 'linear': 'linear', 'with effects': '+ effects'}
 
 
-def add_parser(subparsers):
+def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
         'table1', help="the paper's experiment in the virtual laboratory",
@@ -28,7 +30,7 @@ def add_parser(subparsers):
     return parser
 
 
-def count(text):
+def count(text: str) -> int:
     """Return a positive whole number."""
     number = seed(text)
     if number < 1:
@@ -36,14 +38,14 @@ def count(text):
     return number
 
 
-def seed(text):
+def seed(text: str) -> int:
     """Return a whole number from 0 on."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f'{text!r} is not a whole number from 0 on')
     return int(text)
 
 
-def run(args):
+def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.table1 import table1
 
@@ -55,7 +57,7 @@ def run(args):
         write_json(args.json, result)
 
 
-def report(result):
+def report(result: Mapping[str, Any]) -> str:
     """
     Return the table for a terminal.
 

@@ -2,23 +2,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model against measurement: errors, what each added effect did to them, where it fails."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import os
+from typing import Any, TYPE_CHECKING
 
 from hysteresis_ros.measurements.metrics import Errors, errors, finite, Floor, noise_floor
 from hysteresis_ros.comparison.signals import signals_of
 from hysteresis_ros.comparison.where import blocks_of, number, regions
-from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.measurements.holds import hold_ends, mean_of_windows
 from hysteresis_ros.measurements.quantities import QUANTITIES, shown
+from hysteresis_ros.result import Brief, Result
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model import MuscleModel
 
 FAR_OUTSIDE = 30.0
 """A recording that exceeds the identified range by this factor is probably in another unit."""
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Result):
     """
     A model and what was measured, over all rows of all recordings.
 
@@ -85,16 +95,16 @@ class Comparison:
     sources: list
 
     @property
-    def rows(self):
+    def rows(self) -> int:
         """Number of rows compared."""
         return len(self.measured)
 
     @property
-    def residual(self):
+    def residual(self) -> np.ndarray:
         """Measured less predicted, ndarray of float64 (rows,)."""
         return self.measured - self.predicted
 
-    def to_json(self):
+    def to_dict(self) -> dict[str, Any]:
         """
         Return the comparison as plain types, without the rows themselves.
 
@@ -103,24 +113,64 @@ class Comparison:
         dict
 
         """
-        def named(values):
-            return None if values is None else values.to_json()
+        def named(values: Errors | None) -> dict[str, float | None] | None:
+            return None if values is None else values.to_dict()
 
         return {
             'rows': self.rows, 'quantity': self.quantity, 'unit': self.unit,
-            'model': self.model.to_json(), 'linear': named(self.linear),
-            'by_trial': [{**entry, 'model': entry['model'].to_json(),
+            'model': self.model.to_dict(), 'linear': named(self.linear),
+            'by_trial': [{**entry, 'model': entry['model'].to_dict(),
                           'linear': named(entry['linear'])} for entry in self.by_trial],
-            'where': [region.to_json() for region in self.where],
+            'where': [region.to_dict() for region in self.where],
             'name': self.name, 'continuous': self.continuous,
-            'extensions': [{'name': name, **values.to_json()}
+            'extensions': [{'name': name, **values.to_dict()}
                            for name, values in self.extensions],
             'settled': {key: value if key == 'rows' else named(value)
                         for key, value in self.settled.items()} or None,
             'noise_floor': {'rmse': finite(self.floor.value), 'origin': self.floor.origin},
             'warnings': list(self.warnings), 'sources': list(self.sources)}
 
-    def table(self):
+    def brief(self) -> Brief:
+        """Return the RMSE and where the model fails most, with the table of errors."""
+        unit, scale = shown(self.quantity)
+        others = [f'noise floor {number(scale * self.floor.value)} {unit}']
+        if self.linear is not None:
+            others.insert(0, f'linear {number(scale * self.linear.rmse)} {unit}')
+        lines = [f'Comparison of {self.name}: {self.quantity}, {self.rows} rows of '
+                 f'{len(self.by_trial)} trials',
+                 f'RMSE {number(scale * self.model.rmse)} {unit} ({", ".join(others)})']
+        lines += [f'where: {region.text}' for region in self.where[:1]]
+        return Brief(lines, *self.table())
+
+    def plot(self, name: str = 'overlay') -> 'Figure':
+        """
+        Draw one of the comparison's pictures.
+
+        Parameters
+        ----------
+        name : str
+            `overlay` (measured and predicted, and the residual below), `signals` (the residual
+            against every signal), `loop`, `coverage`, and where there is what they need
+            `waterfall`, `plane`, `since_step`, `correlogram`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ParameterError
+            If there is no such picture of this comparison.
+
+        """
+        from hysteresis_ros.report.plots import figures
+        drawn = figures(self)
+        if name not in drawn:
+            raise ParameterError(f'no picture {name!r} of this comparison; there are '
+                                 f'{", ".join(drawn)}')
+        return drawn[name]
+
+    def table(self) -> tuple[list[str], list[list[str]]]:
         """
         Return the rows of the table of errors.
 
@@ -134,7 +184,7 @@ class Comparison:
         header = ['model', f'mean |e| [{unit}]', f'std [{unit}]', f'RMSE [{unit}]',
                   'mean [%]', 'std [%]']
 
-        def row(name, values):
+        def row(name: str, values: Errors) -> list[str]:
             return [name] + [number(scale * value) for value in values[:3]] + [
                 f'{value:.2f}' if np.isfinite(value) else '-' for value in values[3:]]
 
@@ -150,7 +200,7 @@ class Comparison:
             rows.append(row(f'{self.name}, {ends}', self.settled['model']))
         return header, rows
 
-    def to_text(self):
+    def to_text(self) -> str:
         """Return the table and where the model fails, for a terminal."""
         header, rows = self.table()
         what = 'continuous run' if self.continuous else 'settled states'
@@ -169,7 +219,7 @@ class Comparison:
         return '\n'.join(lines)
 
 
-def layout(rows):
+def layout(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows of cells as lines: the first column to the left, the others to the right."""
     widths = [max(len(row[n]) for row in rows) for n in range(len(rows[0]))]
     return ['  '.join(cell.ljust(width) if n == 0 else cell.rjust(width)
@@ -177,7 +227,8 @@ def layout(rows):
             for row in rows]
 
 
-def compare(model, measurements, progress=None):
+def compare(model: MuscleModel, measurements: Iterable[Measurement],
+            progress: Callable[[str], None] | None = None) -> Comparison:
     """
     Compare a model with recordings, on the response simulated from the inputs alone.
 
@@ -247,7 +298,7 @@ def compare(model, measurements, progress=None):
         sources=[m.source for m in measurements])
 
 
-def check_alike(measurements):
+def check_alike(measurements: Sequence[Measurement]) -> None:
     """Refuse measurements that have no error in common."""
     if not measurements:
         raise MeasurementError('no measurement was given; name CSV files or bag folders')
@@ -259,7 +310,7 @@ def check_alike(measurements):
                 'kind at a time')
 
 
-def ladder(model):
+def ladder(model: MuscleModel) -> list[tuple[str, MuscleModel]]:
     """
     Return the model at every stage of its extension.
 
@@ -286,7 +337,7 @@ def ladder(model):
     return stages
 
 
-def bench_effects(provenance):
+def bench_effects(provenance: Mapping[str, Any]) -> set[str]:
     """
     Return the effects whose parameters were fitted together with the weights of the bench.
 
@@ -312,7 +363,8 @@ def bench_effects(provenance):
     return found
 
 
-def common_signals(model, measurements, predictions):
+def common_signals(model: MuscleModel, measurements: Sequence[Measurement],
+                   predictions: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
     """Return the signals that every measurement has, put together, dict of ndarray (rows,)."""
     found = [signals_of(m, values, model.geometry) for m, values in zip(measurements, predictions)]
     names = [name for name in found[0] if all(name in signals for signals in found)]
@@ -325,26 +377,28 @@ def common_signals(model, measurements, predictions):
     return {name: np.concatenate([signals[name] for signals in found]) for name in names}
 
 
-def trial_numbers(measurements):
+def trial_numbers(measurements: Sequence[Measurement]) -> np.ndarray:
     """Return the number of each row's trial over all recordings, ndarray of int (rows,)."""
     sizes = [rows.stop - rows.start for m in measurements for _, rows in m.split()]
     return np.repeat(np.arange(len(sizes)), sizes)
 
 
-def running_time(measurements):
+def running_time(measurements: Sequence[Measurement]) -> np.ndarray | None:
     """Return the time over all recordings, s, (rows,), None if one of them has none."""
     if any(m.time is None for m in measurements):
         return None
     parts, before = [], 0.0
     for measurement in measurements:
         for _, rows in measurement.split():
-            time = measurement.time[rows]
+            time = measurement.column('time')[rows]
             parts.append(before + time)
             before = float(parts[-1][-1])
     return np.concatenate(parts)
 
 
-def by_trial(measurements, residual, linear_residual, trial, span):
+def by_trial(measurements: Sequence[Measurement], residual: np.ndarray,
+             linear_residual: np.ndarray | None, trial: np.ndarray,
+             span: float) -> list[dict[str, Any]]:
     """Return the errors of each trial, as in `Comparison`."""
     names = [(m.source, number) for m in measurements for number in m.trials]
     entries = []
@@ -357,7 +411,8 @@ def by_trial(measurements, residual, linear_residual, trial, span):
     return entries
 
 
-def at_ends_of_holds(measurements, predictions, linear, span):
+def at_ends_of_holds(measurements: Sequence[Measurement], predictions: Sequence[np.ndarray],
+                     linear: Sequence[np.ndarray] | None, span: float) -> dict[str, Any]:
     """Return the errors of continuous runs at the ends of their holds, {} if not held."""
     residuals, linear_residuals = [], []
     for n, measurement in enumerate(measurements):
@@ -375,7 +430,7 @@ def at_ends_of_holds(measurements, predictions, linear, span):
             'linear': errors(np.concatenate(linear_residuals), span) if linear_residuals else None}
 
 
-def range_notes(model, measurement):
+def range_notes(model: MuscleModel, measurement: Measurement) -> list[str]:
     """
     Say where a recording leaves the ranges on which the model was identified.
 
@@ -391,9 +446,9 @@ def range_notes(model, measurement):
     """
     notes = []
     for name in (measurement.drive, measurement.load):
-        seen = model.ranges.get(name) if name else None
-        if seen is None:
+        if name is None or name not in model.ranges:
             continue
+        seen = model.ranges[name]
         values = measurement.column(name)
         low, high = float(values.min()), float(values.max())
         size = max(abs(seen[0]), abs(seen[1]))

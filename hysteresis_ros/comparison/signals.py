@@ -2,8 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The signals against which a residual is looked at: recorded, or derived from what was."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from hysteresis_ros.measurements.quantities import QUANTITIES, shown
 import numpy as np
+
+if TYPE_CHECKING:
+    from hysteresis_ros.bicep import BicepGeometry
+    from hysteresis_ros.measurements import Measurement
 
 DEAD_BAND = 2e-3
 """Share of the drive's range within which it counts as held."""
@@ -14,7 +22,8 @@ STEP = 3.0
 MOVING_SHARE = 0.2
 
 
-def signals_of(measurement, predicted, geometry=None):
+def signals_of(measurement: Measurement, predicted: np.ndarray,
+               geometry: BicepGeometry | None = None) -> dict[str, np.ndarray]:
     """
     Return every signal that varies in a recording.
 
@@ -52,7 +61,7 @@ def signals_of(measurement, predicted, geometry=None):
         found['time'] = time
         if len(measurement.trials) > 1:
             found['elapsed_time'] = elapsed(measurement)
-    if not measurement.settled:
+    if time is not None and not measurement.settled:
         band = DEAD_BAND * float(np.ptp(drive))
         held = (last < np.arange(len(last))) & (np.abs(jump) > STEP * band)
         if np.mean(held) > MOVING_SHARE:
@@ -67,12 +76,12 @@ def signals_of(measurement, predicted, geometry=None):
             if np.all(np.isfinite(values)) and varies(values)}
 
 
-def varies(values):
+def varies(values: np.ndarray) -> bool:
     """Tell whether a signal changes by more than rounding."""
     return float(np.ptp(values)) > 1e-9 * max(float(np.max(np.abs(values))), 1e-300)
 
 
-def changes(measurement):
+def changes(measurement: Measurement) -> tuple[np.ndarray, np.ndarray]:
     """
     Find when the drive last changed, and by how much, ignoring ripple within a dead band.
 
@@ -100,18 +109,18 @@ def changes(measurement):
     return last, jump
 
 
-def elapsed(measurement):
+def elapsed(measurement: Measurement) -> np.ndarray:
     """Return the time since the recording began, the trials one after the other, (rows,), s."""
     result, before = np.empty(measurement.rows), 0.0
     for _, rows in measurement.split():
-        result[rows] = before + measurement.time[rows]
+        result[rows] = before + measurement.column('time')[rows]
         before = float(result[rows][-1])
     return result
 
 
-def rate(measurement):
+def rate(measurement: Measurement) -> np.ndarray:
     """Return the rate of the drive per second, (rows,)."""
-    drive, time = measurement.column(measurement.drive), measurement.time
+    drive, time = measurement.column(measurement.drive), measurement.column('time')
     result = np.zeros(measurement.rows)
     for _, rows in measurement.split():
         if rows.stop - rows.start > 1:
@@ -121,7 +130,7 @@ def rate(measurement):
     return result
 
 
-def label(name):
+def label(name: str) -> tuple[str, str, float]:
     """
     Return what a signal is called on an axis, and the factor to its unit there.
 

@@ -8,7 +8,8 @@ number suggests. Its interval is therefore taken between blocks of the recording
 than the residual's memory, not between rows.
 """
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 from hysteresis_ros.measurements.metrics import finite
 from hysteresis_ros.comparison.signals import label
@@ -50,7 +51,7 @@ class Bins(NamedTuple):
     half: np.ndarray
 
     @property
-    def certain(self):
+    def certain(self) -> np.ndarray:
         """Whether the mean differs from 0, ndarray of bool (bins,)."""
         return np.abs(self.mean) > self.half
 
@@ -84,14 +85,14 @@ class Region(NamedTuple):
     share: float
     text: str
 
-    def to_json(self):
+    def to_dict(self) -> dict[str, Any]:
         """Return the entry of `where` in the JSON of compare."""
         return {'signal': self.signal, 'from': finite(self.low), 'to': finite(self.high),
                 'mean_residual': finite(self.mean_residual), 'rmse': finite(self.rmse),
                 'rows': int(self.rows), 'share': finite(self.share), 'text': self.text}
 
 
-def blocks_of(residual, trial):
+def blocks_of(residual: np.ndarray, trial: np.ndarray) -> np.ndarray:
     """
     Divide the rows into blocks that are longer than the memory of the residual.
 
@@ -116,7 +117,7 @@ def blocks_of(residual, trial):
     return np.cumsum(fresh) - 1
 
 
-def memory(residual):
+def memory(residual: np.ndarray) -> float:
     """
     Return after how many rows the residual has forgotten itself.
 
@@ -136,7 +137,7 @@ def memory(residual):
     return float(1.0 + 2.0 * np.sum(correlation[:end]))
 
 
-def correlogram(residual, most=None):
+def correlogram(residual: np.ndarray, most: int | None = None) -> np.ndarray:
     """
     Return the autocorrelation of a residual.
 
@@ -162,7 +163,8 @@ def correlogram(residual, most=None):
     return covariance / covariance[0]
 
 
-def binned(signal, values, residual, block, edges=None):
+def binned(signal: str, values: np.ndarray, residual: np.ndarray, block: np.ndarray,
+           edges: np.ndarray | None = None) -> Bins:
     """
     Average a residual in bins of a signal.
 
@@ -198,7 +200,7 @@ def binned(signal, values, residual, block, edges=None):
     return Bins(signal, low, high, centre, rows, mean, rmse, half)
 
 
-def bin_index(values):
+def bin_index(values: np.ndarray) -> np.ndarray:
     """Return the bin of each row, from 0 without gaps, ascending with the value."""
     unique, inverse = np.unique(values, return_inverse=True)
     if len(unique) <= MOST_BINS:
@@ -209,7 +211,8 @@ def bin_index(values):
     return np.unique(index, return_inverse=True)[1]
 
 
-def half_width(deviation, index, block, rows):
+def half_width(deviation: np.ndarray, index: np.ndarray, block: np.ndarray,
+               rows: np.ndarray) -> np.ndarray:
     """Return the half widths of the intervals of the means, between blocks, (bins,)."""
     bins, blocks = len(rows), int(block.max()) + 1
     cell = index * blocks + block
@@ -224,7 +227,8 @@ def half_width(deviation, index, block, rows):
     return half
 
 
-def regions(signals, residual, block, quantity):
+def regions(signals: Mapping[str, np.ndarray], residual: np.ndarray, block: np.ndarray,
+            quantity: str) -> list[Region]:
     """
     Name the worst regions, worst first.
 
@@ -261,7 +265,7 @@ def regions(signals, residual, block, quantity):
     return ([overall] if overall else []) + found
 
 
-def worst_run(bins, overall):
+def worst_run(bins: Bins, overall: float) -> tuple[float, int, int, bool] | None:
     """
     Find the neighbouring bins that fail most.
 
@@ -301,7 +305,8 @@ def worst_run(bins, overall):
     return best
 
 
-def offset_everywhere(signals, residual, block, quantity, total):
+def offset_everywhere(signals: Mapping[str, np.ndarray], residual: np.ndarray, block: np.ndarray,
+                      quantity: str, total: float) -> Region | None:
     """Return the region over everything, if most of the error is one constant, else None."""
     mean = float(np.mean(residual))
     half = half_width(residual - mean, np.zeros(len(residual), dtype=int), block,
@@ -313,7 +318,8 @@ def offset_everywhere(signals, residual, block, quantity, total):
                   whole=True)
 
 
-def region(name, low, high, residual, total, rows, quantity, whole=False):
+def region(name: str, low: float, high: float, residual: np.ndarray, total: float, rows: int,
+           quantity: str, whole: bool = False) -> Region:
     """Build a region from its rows' residual, with its sentence."""
     mean, rmse = float(np.mean(residual)), float(np.sqrt(np.mean(residual ** 2)))
     share = float(np.sum(residual ** 2)) / total
@@ -332,7 +338,7 @@ def region(name, low, high, residual, total, rows, quantity, whole=False):
     return Region(name, float(low), float(high), mean, rmse, len(residual), share, text)
 
 
-def placed(name, low, high):
+def placed(name: str, low: float, high: float) -> str:
     """Say in words which part of a signal's range is meant."""
     text, unit, scale = label(name)
     if name == 'direction':
@@ -346,7 +352,7 @@ def placed(name, low, high):
     return f'where {text} is {number(scale * low)} to {number(scale * high)}{unit}'
 
 
-def number(value):
+def number(value: float) -> str:
     """Return a number as a person would write it: three digits, no exponent where avoidable."""
     if value == 0 or not np.isfinite(value):
         return f'{value:g}'

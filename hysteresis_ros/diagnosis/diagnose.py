@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Find the physical effects that a model is missing, or say why none can be named."""
 
+import dataclasses
+
 import numpy as np
 
 from hysteresis_ros.diagnosis.arm_verdict import arm_verdict
@@ -52,6 +54,6 @@ def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
     """
     problem = problem_for(model, measurements, effects, jobs)
     rng = np.random.default_rng(seed)
-    if problem.refits:
-        return bench_verdict(problem, settings, rng, jobs, progress)
-    return arm_verdict(problem, settings, rng, progress)
+    found = (bench_verdict(problem, settings, rng, jobs, progress) if problem.refits
+             else arm_verdict(problem, settings, rng, progress))
+    return dataclasses.replace(found, quantity=problem.response)

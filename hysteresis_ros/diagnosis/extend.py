@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Add effects to a model, fit them, and show the error before and after on data not fitted."""
 
+from __future__ import annotations
+
 import dataclasses
 import hashlib
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,13 +18,19 @@ from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.measurements.quantities import shown
+from hysteresis_ros.model import MuscleModel
+from hysteresis_ros.result import Brief, Result
 from hysteresis_ros.workers import one_blas_thread
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 EVALUATIONS = 30
 
 
-@dataclasses.dataclass
-class Extension:
+@dataclasses.dataclass(repr=False)
+class Extension(Result):
     """
     An extended model with what it gained.
 
@@ -38,16 +47,19 @@ class Extension:
         Error on `test`, or on `train` without one, of the base and after each effect.
     implausible : list of str
         Parameters outside their physical range.
+    quantity : str
+        What was measured: 'angle', 'length' or 'strain'.
     """
 
-    model: object
+    model: MuscleModel
     added: list
     train: dict
     test: dict
     steps: list
     implausible: list
+    quantity: str = ''
 
-    def to_json(self) -> dict:
+    def to_dict(self) -> dict:
         """Return plain types for JSON."""
         return {
             'added': [effect.id for effect in self.added],
@@ -55,6 +67,32 @@ class Extension:
             'train': self.train, 'test': self.test,
             'steps': [{'model': name, 'rmse': value} for name, value in self.steps],
             'implausible': self.implausible}
+
+    def brief(self) -> Brief:
+        """Return the error before and after, with the table of the parameters."""
+        unit, scale = shown(self.quantity)
+        lines = ['Extension: + ' + ' + '.join(effect.id for effect in self.added)]
+        lines += [f'RMSE on data {what}: {scale * error["rmse_before"]:.3g} -> '
+                  f'{scale * error["rmse_after"]:.3g} {unit}'.rstrip()
+                  for what, error in (('fitted', self.train), ('not fitted', self.test)) if error]
+        if self.implausible:
+            lines.append('outside their physical range: ' + ', '.join(self.implausible))
+        rows = [[effect.id, name, f'{entry["value"]:.4g}', f'{entry["low"]:.4g}',
+                 f'{entry["high"]:.4g}', entry['unit']] for effect in self.added
+                for name, entry in effect.to_dict()['parameters'].items()]
+        return Brief(lines, ['effect', 'parameter', 'value', 'low', 'high', 'unit'], rows)
+
+    def plot(self) -> Figure:
+        """
+        Draw how the error falls with every effect that was added.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        """
+        from hysteresis_ros.report.plots import waterfall
+        return waterfall(self.steps, None, self.quantity)
 
 
 def rmse(model, measurements) -> float:
@@ -122,7 +160,7 @@ def extend(model, names, train, test=()) -> Extension:
             return {}
         return {'rmse_before': rmse(before, recordings), 'rmse_after': rmse(extended, recordings)}
     return Extension(extended, added, both(list(train)), both(list(test)), steps,
-                     implausible)
+                     implausible, problem.response)
 
 
 def _checked(problem, names):

@@ -7,8 +7,12 @@ How a model answers to them is told by the kind of the measurements: see `arm_pr
 `bench_problem`.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from hysteresis_ros.effects import Effect
+from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.model.simulation import Simulator
 
 # A long recording is judged on about this many rows; between them nothing new is learned. Weights
@@ -61,6 +65,10 @@ class Problem:
         self.noise = max(sensor_resolution(m) for m in measurements)
         self._divide()
         self.signals = self._signals()
+
+    def completed(self, effects: Sequence[Effect]) -> MuscleModel:
+        """Return the model with effects; where weights are refitted, with new ones."""
+        raise NotImplementedError
 
     def pick(self, columns) -> np.ndarray:
         """Return the judged rows of a column given for every recording, shape (n,)."""

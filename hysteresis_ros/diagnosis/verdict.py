@@ -2,19 +2,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """The answer of a diagnosis, and what both kinds of measurement say in the same words."""
 
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.measurements.quantities import shown
+from hysteresis_ros.result import Brief, Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Effects whose signatures agree more than this (|cosine|) cannot be told apart.
 CONFUSED = 0.9
+# Effects in the short table of a diagnosis.
+SHOWN = 5
 
 
-@dataclasses.dataclass
-class Diagnosis:
+@dataclasses.dataclass(repr=False)
+class Diagnosis(Result):
     """
     The verdict and what it rests on; `to_dict` gives the fields by the names users rely on.
 
@@ -53,6 +63,11 @@ class Diagnosis:
         Effects that an unknown one is like; they explain it with implausible values.
     learned : dict or None
         A learned term that is offered instead.
+    quantity : str
+        What was measured: 'angle', 'length', 'strain' or 'force'.
+    where : list of dict
+        Where the model fails, worst first, as in the JSON of `compare`; empty where no comparison
+        was asked for.
     """
 
     verdict: str
@@ -72,6 +87,8 @@ class Diagnosis:
     signal: str
     resembles: list = dataclasses.field(default_factory=list)
     learned: dict | None = None
+    quantity: str = ''
+    where: list = dataclasses.field(default_factory=list)
 
     def to_dict(self) -> dict:
         """Return plain types for JSON."""
@@ -80,7 +97,41 @@ class Diagnosis:
         content['effects'] = [effect.to_dict() for effect in self.effects]
         return content
 
-    to_json = to_dict
+    def brief(self) -> Brief:
+        """Return verdict, error and next experiment, with the table of the effects tried."""
+        unit, scale = shown(self.quantity)
+        first = f'Diagnosis: {self.verdict}'
+        if self.missing:
+            first += ' ' + ' + '.join(self.missing)
+        shares = [entry['probability'] for entry in self.sets
+                  if self.missing and set(entry['effects']) == set(self.missing)]
+        if shares:
+            first += f' (probability {shares[0]:.2f})'
+        error = f'RMSE on rows not fitted: {scale * self.rmse_before:.3g} {unit}'
+        if self.missing:
+            error += f', with the effects {scale * self.rmse_after:.3g} {unit}'
+        lines = [first, error, f'next: {self.experiment}']
+        others = [f'{name} cannot be told from {", ".join(rest)}'
+                  for name, rest in zip(self.missing, self.alternatives) if rest]
+        if others:
+            lines.insert(1, '; '.join(others))
+        rows = [[row['effect'], f'{scale * row["rmse_after"]:.3g}', f'{100.0 * row["gain"]:.0f} %',
+                 f'{row["p_value"]:.3f}', 'yes' if row['plausible'] else 'no']
+                for row in self.ranking[:SHOWN]]
+        return Brief(lines, ['effect', f'RMSE after [{unit or "1"}]', 'gain', 'p', 'plausible'],
+                     rows)
+
+    def plot(self) -> Figure:
+        """
+        Draw the error with each effect added alone, with 95 % intervals.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        """
+        from hysteresis_ros.report.plots import ranking
+        return ranking(self)
 
 
 def ranking_row(effect, fit, before: float, after: float, p_value: float, gain: tuple) -> dict:

@@ -12,6 +12,11 @@ one load        L = H[V] at one load, another H    Fig. 9
 =============== ================================== ==================
 """
 
+from __future__ import annotations
+
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from hysteresis_ros.errors import IdentificationError
@@ -20,10 +25,13 @@ from hysteresis_ros.identification.operators import fit_operator, smoothness
 from hysteresis_ros.model.linear import LinearModel
 from hysteresis_ros.model.muscle import COLD_DRIVE
 from hysteresis_ros.operators import (
-    Additive, Cascade, Linear, Preisach, cell_areas, signed_areas)
+    Additive, Cascade, HysteresisOperator, Linear, Preisach, cell_areas, signed_areas)
+
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
 
 
-def fit_linear(length=None, force=None) -> LinearModel:
+def fit_linear(length: Measurement | None = None, force: Measurement | None = None) -> LinearModel:
     """
     Fit Eq. 11 as the paper does: a line through the forces, then one through the lengths.
 
@@ -40,17 +48,17 @@ def fit_linear(length=None, force=None) -> LinearModel:
     IdentificationError
         If there is no table, or the drive does not vary.
     """
-    if length is None and force is None:
-        raise IdentificationError('linear model: no table given; give forces or lengths')
     some = force if force is not None else length
+    if some is None:
+        raise IdentificationError('linear model: no table given; give forces or lengths')
     if not np.ptp(some.column(some.drive)) > 0.0:
         raise IdentificationError(f'{some.source}: the {some.drive} does not vary')
     if force is not None:
         slope, offset = np.polyfit(force.column(force.drive), force.column('force'), 1)
         return LinearModel(float(slope), 1.0 if length is None else _length_per_force(
             length, slope, offset), float(offset))
-    drive, target = length.column(length.drive), length.column(length.response)
-    load = _loads(length)
+    drive, target = some.column(some.drive), some.column(some.response)
+    load = _loads(some)
     if np.ptp(load) > 0.0:
         columns = np.column_stack([load, drive, np.ones(len(drive))])
         scale = np.abs(columns).max(axis=0)
@@ -64,17 +72,17 @@ def fit_linear(length=None, force=None) -> LinearModel:
     return LinearModel(float(-by_drive), 1.0, float(np.mean(load) - offset))
 
 
-def _loads(length):
+def _loads(length: Measurement) -> np.ndarray:
     return length.column(length.load) if length.load else np.zeros(length.rows)
 
 
-def _length_per_force(length, slope, offset):
+def _length_per_force(length: Measurement, slope: float, offset: float) -> float:
     z = _loads(length) - slope * length.column(length.drive) - offset
     square = float(z @ z)
     return float(z @ length.column(length.response)) / square if square > 0.0 else 1.0
 
 
-def fit_additive(length, levels: int = 20) -> tuple[Additive, WeightFit]:
+def fit_additive(length: Measurement, levels: int = 20) -> tuple[Additive, WeightFit]:
     """
     Fit the additive model, both operators at once.
 
@@ -115,8 +123,8 @@ def fit_additive(length, levels: int = 20) -> tuple[Additive, WeightFit]:
                     Preisach(grids[0], fit.weights[:count], fit.bias)), fit
 
 
-def fit_embedded_line(length, force=None, levels: int = 20,
-                      fitted: np.ndarray | None = None) -> tuple[Cascade, WeightFit]:
+def fit_embedded_line(length: Measurement, force: Measurement | None = None, levels: int = 20,
+                      fitted: np.ndarray | None = None) -> tuple[Cascade, WeightFit | None]:
     """
     Fit L = H5[F - a1 V - a0]: the two-stage model with a line for its first stage.
 
@@ -143,7 +151,8 @@ def fit_embedded_line(length, force=None, levels: int = 20,
     return Cascade([first, second]), fit
 
 
-def fit_one_load(length, levels: int = 20) -> tuple[Preisach, WeightFit]:
+def fit_one_load(length: Measurement,
+                 levels: int = 20) -> tuple[HysteresisOperator, WeightFit | None]:
     """
     Fit one Preisach operator of the drive to trials under one load (Fig. 9).
 
@@ -173,7 +182,7 @@ def fit_one_load(length, levels: int = 20) -> tuple[Preisach, WeightFit]:
                         length.column(length.response), length.column('trial'), levels)
 
 
-def simulate(model, length) -> np.ndarray:
+def simulate(model: Additive | Cascade | HysteresisOperator, length: Measurement) -> np.ndarray:
     """
     Return the lengths that a baseline predicts for every row of a table, shape (rows,).
 
@@ -191,11 +200,11 @@ def simulate(model, length) -> np.ndarray:
     return np.concatenate(outputs)
 
 
-def _cold(length):
+def _cold(length: Measurement) -> float:
     return COLD_DRIVE.get(length.drive, float(length.column(length.drive).min()))
 
 
-def _parts(length):
+def _parts(length: Measurement) -> list[tuple[np.ndarray, np.ndarray]]:
     """Drives and loads of each trial, the cold state first, each (1 + rows,)."""
     drive, load = length.column(length.drive), _loads(length)
     return [(np.append(_cold(length), drive[part]), np.append(load[part][0], load[part]))

@@ -9,28 +9,38 @@ from the cold state after a full heat and cool cycle, so before its first row th
 applied to a saturated memory.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros import __version__
 from hysteresis_ros.measurements.metrics import errors
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
-from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.errors import IdentificationError, ParameterError
 from hysteresis_ros.identification.baselines import fit_linear
 from hysteresis_ros.identification.first_stage import first_stage_from_lengths
 from hysteresis_ros.identification.least_squares import WeightFit
 from hysteresis_ros.identification.operators import fit_operator
+from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import MuscleModel
+from hysteresis_ros.result import Brief, Result
 from hysteresis_ros.workers import one_blas_thread
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from hysteresis_ros.bicep import BicepGeometry
+    from hysteresis_ros.operators import HysteresisOperator
 
 LEVELS = (10, 20)
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
-@dataclasses.dataclass
-class Identified:
+@dataclasses.dataclass(repr=False)
+class Identified(Result):
     """
     A model with the fits that it came from.
 
@@ -41,11 +51,62 @@ class Identified:
     force_fit, length_fit : WeightFit or None
         Results of the least squares, with rank, cells never excited and intervals; None where the
         stage has no weights or was not identified.
+    force, length : Measurement or None
+        The bench tables, with the rows that verify.
     """
 
     model: MuscleModel
     force_fit: WeightFit | None
     length_fit: WeightFit | None
+    force: Measurement | None = None
+    length: Measurement | None = None
+
+    def to_dict(self) -> dict:
+        """Return plain types for JSON: kind, metrics and effects of the model."""
+        return {'kind': self.model.kind, 'metrics': self.model.metrics,
+                'effects': [effect.to_dict() for effect in self.model.effects]}
+
+    def brief(self) -> Brief:
+        """Return what was identified, with the mean errors as in Table I."""
+        rows = [[f'{name}, {part}', *(
+            '-' if values[of]['mean_percent'] is None else f'{values[of]["mean_percent"]:.2f} %'
+            for of in ('model', 'linear')), str(values['rows'])]
+            for name, entry in self.model.metrics.items() for part, values in entry.items()
+            if isinstance(values, dict) and 'model' in values]
+        effects = ' + '.join(['', *(effect.id for effect in self.model.effects)])
+        lines = [f'Identified: {self.model.kind}{effects}, {self.model.response} of '
+                 f'{self.model.drive}']
+        lines += [f'{row[0]}: mean error {row[1]} (linear {row[2]}), {row[3]} rows'
+                  for row in rows]
+        return Brief(lines, ['mean error', 'model', 'linear', 'rows'], rows)
+
+    def plot(self, table: str | None = None) -> 'Figure':
+        """
+        Draw the loops of a bench table, measured and predicted, and the residual on them.
+
+        Parameters
+        ----------
+        table : {'length', 'force'}, optional
+            Default: the length table, else the force table.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ParameterError
+            If there is no such table.
+
+        """
+        from hysteresis_ros.comparison.compare import compare
+        tables = {name: measurement for name, measurement in (
+            ('length', self.length), ('force', self.force)) if measurement is not None}
+        name = table or next(iter(tables), 'length')
+        if name not in tables:
+            raise ParameterError(f'no {name} table was identified; there is '
+                                 f'{" and ".join(tables) or "none"}')
+        return compare(self.model, [tables[name]]).plot('loop')
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,14 +128,16 @@ class Recipe:
     anchored: bool
     plain: bool
 
-    def fit(self, parts, target, groups, levels, anchor, placed, fitted=None):
+    def fit(self, parts: Sequence[np.ndarray], target: np.ndarray, groups: np.ndarray, levels: int,
+            anchor: tuple[float, float], placed: bool,
+            fitted: np.ndarray | None = None) -> tuple[HysteresisOperator, WeightFit | None]:
         """Return operator and fit; the parameters are those of `fit_operator`."""
         options = {'strength': 0.0, 'reversible': False} if self.plain else {'placed': placed}
         return fit_operator(self.kind, parts, target, groups, levels,
                             anchor=anchor if self.anchored else None, fitted=fitted, **options)
 
 
-def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray:
+def choose_trials(measurement: Measurement, trials: Sequence | None, name: str) -> np.ndarray:
     """
     Say which rows belong to the trials named; all of them by default.
 
@@ -96,10 +159,11 @@ def choose_trials(measurement, trials: Sequence | None, name: str) -> np.ndarray
 
 
 @one_blas_thread()
-def identify(length=None, force=None, *, force_trials=None, length_trials=None, geometry=None,
-             levels: Sequence[int] = LEVELS, operator: str | None = None,
-             anchored: bool = False, plain: bool = False,
-             length_rows: np.ndarray | None = None) -> Identified:
+def identify(length: Measurement | None = None, force: Measurement | None = None, *,
+             force_trials: Sequence[float] | None = None,
+             length_trials: Sequence[float] | None = None, geometry: BicepGeometry | None = None,
+             levels: Sequence[int] = LEVELS, operator: str | None = None, anchored: bool = False,
+             plain: bool = False, length_rows: np.ndarray | None = None) -> Identified:
     """
     Identify the muscle from bench tables.
 
@@ -136,10 +200,11 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     IdentificationError
         If the tables do not suffice or do not fit together.
     """
-    if length is None and force is None:
+    some = length if length is not None else force
+    if some is None:
         raise IdentificationError('nothing to identify; give a length table, a force table or both')
     loaded = length is not None and length.load is not None
-    if operator is None and loaded and force is None:
+    if operator is None and length is not None and loaded and force is None:
         options = {'length_trials': length_trials, 'geometry': geometry, 'levels': levels,
                    'anchored': anchored, 'plain': plain}
         return _better_of(length, ('two-stage', 'preisach'), options)
@@ -153,11 +218,10 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
     if len(levels) != 2 or min(levels) < 1:
         raise IdentificationError(f'levels must be two positive numbers, not {levels}')
     kind = 'preisach' if operator in ('two-stage', 'preisach') else operator
-    some = length if length is not None else force
     recipe = Recipe(kind, anchored, plain)
     model = MuscleModel(
         'preisach' if operator == 'preisach' else 'two-stage', some.drive,
-        length.load if loaded else None, length.response if length is not None else 'force',
+        None if length is None else length.load, 'force' if length is None else length.response,
         None, geometry=geometry)
     _set_ranges(model, length, force)
     force_fit = length_fit = None
@@ -177,28 +241,32 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
         force and force.where(choose_trials(force, force_trials, 'force')))
     model.metrics = measure(model, force, force_trials, length, length_trials)
     model.provenance = _provenance(force, force_trials, length, length_trials)
-    return Identified(model, force_fit, length_fit)
+    return Identified(model, force_fit, length_fit, force, length)
 
 
-def _better_of(length, operators, options):
+def _better_of(length: Measurement, operators: Sequence[str],
+               options: Mapping[str, Any]) -> Identified:
     """Identify with each operator and return what is best on held-out trials."""
-    found, problem = [], None
+    found: list[Identified] = []
+    problems = []
     for operator in operators:
         try:
             found.append(identify(length, operator=operator, **options))
         except IdentificationError as error:
-            problem = error
+            problems.append(error)
     if not found:
-        raise problem
+        raise problems[-1]
 
-    def held_out(one):
+    def held_out(one: Identified) -> float:
         # The paper's plain problem holds nothing out.
         fit = one.length_fit
-        return fit.validation.min() if len(fit.validation) else fit.rmse
+        if fit is None:
+            return np.inf
+        return float(fit.validation.min()) if len(fit.validation) else fit.rmse
     return min(found, key=held_out)
 
 
-def _set_ranges(model, length, force):
+def _set_ranges(model: MuscleModel, length: Measurement | None, force: Measurement | None) -> None:
     for measurement in (force, length):
         if measurement is None:
             continue
@@ -208,16 +276,17 @@ def _set_ranges(model, length, force):
             values = measurement.column(name)
             low, high = model.ranges.get(name, (np.inf, -np.inf))
             model.ranges[name] = (float(min(low, values.min())), float(max(high, values.max())))
-    if model.load_name is not None:
+    if model.load_name is not None and length is not None:
         model.mean_load = float(np.mean(length.column(model.load_name)))
 
 
-def _parts(measurement, rows):
+def _parts(measurement: Measurement, rows: np.ndarray) -> list[tuple[float, slice]]:
     """Slices of the chosen trials, in the order of the file."""
     return [(trial, part) for trial, part in measurement.split() if rows[part.start]]
 
 
-def _force_stage(model, force, rows, levels, recipe):
+def _force_stage(model: MuscleModel, force: Measurement, rows: np.ndarray, levels: int,
+                 recipe: Recipe) -> tuple[HysteresisOperator, WeightFit | None]:
     """Fit H1 to force against drive."""
     drive, target = force.column(model.drive), force.column('force')
     parts = [np.concatenate(([model.cold_drive], drive[part])) for _, part in _parts(force, rows)]
@@ -225,7 +294,7 @@ def _force_stage(model, force, rows, levels, recipe):
                       (model.cold_drive, float(target[rows][0])), placed=False)
 
 
-def _second_inputs(model, length, rows):
+def _second_inputs(model: MuscleModel, length: Measurement, rows: np.ndarray) -> list[np.ndarray]:
     """Return the inputs of H2 for each trial, the cold one first."""
     drive = length.column(model.drive)
     load = length.column(model.load_name) if model.load_name else np.zeros(len(drive))
@@ -243,13 +312,15 @@ def _second_inputs(model, length, rows):
     return parts
 
 
-def _fitted_rows(length, trials, some):
+def _fitted_rows(length: Measurement, trials: Sequence[float] | None,
+                 some: np.ndarray | None) -> np.ndarray:
     """Return the rows of the length table that are fitted, ndarray of bool."""
     rows = choose_trials(length, trials, 'length')
     return rows if some is None else rows & some
 
 
-def _length_stage(model, length, rows, levels, recipe, some):
+def _length_stage(model: MuscleModel, length: Measurement, rows: np.ndarray, levels: int,
+                  recipe: Recipe, some: np.ndarray | None) -> WeightFit | None:
     """Fit H2 to length against F - H1[V]."""
     model.length_stage, fit = recipe.fit(
         _second_inputs(model, length, rows), length.column(model.response)[rows],
@@ -259,7 +330,8 @@ def _length_stage(model, length, rows, levels, recipe, some):
     return fit
 
 
-def _drive_stage(model, length, rows, levels, recipe, some):
+def _drive_stage(model: MuscleModel, length: Measurement, rows: np.ndarray, levels: int,
+                 recipe: Recipe, some: np.ndarray | None) -> WeightFit | None:
     """Fit one operator of the drive, of the sign that fits better."""
     results = []
     for sign in (-1, 1):
@@ -272,17 +344,19 @@ def _drive_stage(model, length, rows, levels, recipe, some):
     return fit
 
 
-def _first_stage_from_lengths(model, length, rows, levels):
+def _first_stage_from_lengths(model: MuscleModel, length: Measurement, rows: np.ndarray,
+                              levels: int) -> HysteresisOperator:
     """Find H1 without a force table, from the shift of the loops between loads."""
-    def columns(name):
+    def columns(name: str) -> list[np.ndarray]:
         values = length.column(name)
         return [values[part] for _, part in _parts(length, rows)]
     return first_stage_from_lengths(
-        columns(model.drive), columns(model.load_name), columns(model.response),
+        columns(model.drive), columns(model.load_name or 'force'), columns(model.response),
         model.cold_drive, levels, squared=model.drive in ELECTRIC_DRIVES)
 
 
-def measure(model, force, force_trials, length, length_trials):
+def measure(model: MuscleModel, force: Measurement | None, force_trials: Sequence[float] | None,
+            length: Measurement | None, length_trials: Sequence[float] | None) -> dict[str, Any]:
     """
     Return the model's metrics: errors on fitted and on other trials, of both methods.
 
@@ -310,11 +384,11 @@ def measure(model, force, force_trials, length, length_trials):
         span = float(np.ptp(measured))
         predicted = {method: model.predict(measurement, method)
                      for method in ('preisach', 'linear')}
-        entry = {}
+        entry: dict[str, dict[str, Any]] = {}
         for part, chosen in (('identification', rows), ('verification', ~rows)):
             if np.any(chosen):
                 entry[part] = {
-                    label: errors((predicted[method] - measured)[chosen], span).to_json()
+                    label: errors((predicted[method] - measured)[chosen], span).to_dict()
                     for label, method in (('model', 'preisach'), ('linear', 'linear'))}
                 entry[part]['rmse'] = entry[part]['model']['rmse']
                 entry[part]['rows'] = int(np.count_nonzero(chosen))
@@ -322,8 +396,10 @@ def measure(model, force, force_trials, length, length_trials):
     return metrics
 
 
-def _provenance(force, force_trials, length, length_trials):
-    entries = {'hysteresis_ros': __version__, 'numpy': np.__version__}
+def _provenance(force: Measurement | None, force_trials: Sequence[float] | None,
+                length: Measurement | None,
+                length_trials: Sequence[float] | None) -> dict[str, Any]:
+    entries: dict[str, Any] = {'hysteresis_ros': __version__, 'numpy': np.__version__}
     for name, measurement, trials in (('force', force, force_trials),
                                       ('length', length, length_trials)):
         if measurement is not None:

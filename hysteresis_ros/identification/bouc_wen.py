@@ -86,7 +86,8 @@ def fit_bouc_wen(parts: Sequence[np.ndarray], target: np.ndarray, low: float, hi
 class _Problem:
     """The least squares problem, input and output brought to ranges of 1."""
 
-    def __init__(self, parts, target, low, high, fitted):
+    def __init__(self, parts: Sequence[np.ndarray], target: np.ndarray, low: float, high: float,
+                 fitted: np.ndarray) -> None:
         self.parts, self.target, self.low, self.high = parts, target, low, high
         self.fitted = fitted
         target = target[fitted]
@@ -95,14 +96,14 @@ class _Problem:
         self.middle = float(np.mean(target))
         self.outputs = (target - self.middle) / self.span
 
-    def thinned(self, rows):
+    def thinned(self, rows: Sequence[np.ndarray]) -> '_Problem':
         """Return the problem with some rows of each part only."""
         first = np.cumsum([0] + [len(part) - 1 for part in self.parts[:-1]])
         kept = np.concatenate([start + some[1:] - 1 for start, some in zip(first, rows)])
         return _Problem([part[some] for part, some in zip(self.parts, rows)], self.target[kept],
                         self.low, self.high, self.fitted[kept])
 
-    def loops(self, vector):
+    def loops(self, vector: np.ndarray) -> tuple[np.ndarray, tuple[float, float]]:
         """Return x for the rows to fit, shape (n,), and its factors of input and state."""
         from hysteresis_ros.kernels.bouc_wen import follow
         rate, twice, exponent = 10.0 ** vector[:3]
@@ -114,7 +115,7 @@ class _Problem:
              + factors[1] * follow(part, 0.0, -1.0, rate, twice - 1.0, exponent, pole))[1:]
             for part in self.inputs])[self.fitted], factors
 
-    def curve(self, x):
+    def curve(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
         """Return the columns of S, centred, the slopes that fit best, and the place of x."""
         start, width = float(x.min()), max(float(np.ptp(x)), 1e-12)
         place = (x - start) / width
@@ -129,7 +130,7 @@ class _Problem:
                                       np.zeros(PIECES, dtype=bool))
         return columns, LEAST_SLOPE + slopes, (start, width)
 
-    def residual(self, vector):
+    def residual(self, vector: np.ndarray) -> np.ndarray:
         """Return the errors and the roughness of S at its best, in shares of the root of n."""
         x, _ = self.loops(vector)
         columns, slopes, _ = self.curve(x)
@@ -137,14 +138,14 @@ class _Problem:
         error -= error.mean() + self.outputs
         return np.append(error / np.sqrt(len(x)), np.sqrt(SMOOTHNESS) * np.diff(slopes))
 
-    def refine(self, vector):
+    def refine(self, vector: np.ndarray) -> optimize.OptimizeResult:
         """Return the result of scipy's search from a start."""
         inside = np.clip(vector, LOWEST + 1e-6, HIGHEST - 1e-6)
         return optimize.least_squares(
             self.residual, inside, bounds=(LOWEST, HIGHEST), method='trf', diff_step=DIFFERENCE,
             ftol=1e-12, xtol=1e-10, gtol=1e-12, max_nfev=EVALUATIONS)
 
-    def operator(self, vector):
+    def operator(self, vector: np.ndarray) -> BoucWen:
         """Return the operator with the S that fits all rows."""
         x, factors = self.loops(vector)
         columns, slopes, (start, width) = self.curve(x)

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The models that are compared with each other: how each is fitted, and what it is given."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,9 @@ from hysteresis_ros.identification.baselines import fit_additive, fit_embedded_l
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.operators import (
     Additive, BoucWen, Cascade, HysteresisOperator, Linear, PrandtlIshlinskii, Preisach)
+
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
 
 # Levels of the Preisach operators, of H2 or of the one of the drive; H1 has half as many.
 LEVELS = (5, 10, 20)
@@ -28,14 +34,15 @@ class Fold:
 
     Attributes
     ----------
-    length, force : Measurement or None
+    length : Measurement
+    force : Measurement or None
         Tables to fit.
     fitted : ndarray of bool, shape (rows,), or None
         Rows of the length table to fit; None for all.
     """
 
-    length: object
-    force: object
+    length: Measurement
+    force: Measurement | None
     fitted: np.ndarray | None
 
 
@@ -87,7 +94,7 @@ def parameters_of(operator: HysteresisOperator) -> int:
     return 2
 
 
-def inputs_of(model: FittedModel, table) -> list:
+def inputs_of(model: FittedModel, table: Measurement) -> list:
     """Return what a model is given in each trial, the cold state first, (1 + rows, stages)."""
     drive = table.column(table.drive)
     parts = []
@@ -100,7 +107,8 @@ def inputs_of(model: FittedModel, table) -> list:
     return parts
 
 
-def candidates(length, force, by_trial: bool) -> tuple[list, dict]:
+def candidates(length: Measurement, force: Measurement | None,
+               by_trial: bool) -> tuple[list, dict]:
     """
     Return the models that tables allow, and why others are left out.
 
@@ -117,7 +125,8 @@ def candidates(length, force, by_trial: bool) -> tuple[list, dict]:
     names = [('preisach', f'Preisach N = {levels}', levels) for levels in LEVELS]
     names += [('play', f'Prandtl-Ishlinskii, {plays} plays', plays) for plays in PLAYS]
     names += [('bouc-wen', 'Bouc-Wen', LEVELS[0])]
-    found, left_out = [Candidate('line', _line)], {}
+    found = [Candidate('line', _line)]
+    left_out: dict[str, str] = {}
     found += [Candidate(name, functools.partial(_of_the_drive, kind, levels))
               for kind, name, levels in names]
     if length.load is None:
@@ -136,12 +145,13 @@ def candidates(length, force, by_trial: bool) -> tuple[list, dict]:
     return found, left_out
 
 
-def _model(operator, length, sign=1, load=None):
+def _model(operator: Cascade | Additive, length: Measurement, sign: int = 1,
+           load: str | None = None) -> FittedModel:
     cold = 0.0 if length.drive != 'temperature' else float(length.column(length.drive).min())
     return FittedModel(operator, cold, sign, load)
 
 
-def _line(fold):
+def _line(fold: Fold) -> FittedModel:
     length = fold.length if fold.fitted is None else fold.length.where(fold.fitted)
     line = fit_linear(length, fold.force if length.load is not None else None)
     drive = fold.length.column(fold.length.drive)
@@ -157,29 +167,29 @@ def _line(fold):
     return _model(Cascade([first, second]), fold.length, load=length.load)
 
 
-def _of_the_drive(kind, levels, fold):
+def _of_the_drive(kind: str, levels: int, fold: Fold) -> FittedModel:
     """Fit one operator of the drive, which does not know the load."""
     table = fold.length
     if table.load is not None:
         columns = {name: values for name, values in table.columns.items() if name != table.load}
         table = type(table).from_columns(columns, source=table.source)
     found = identify(table, operator=kind, levels=(levels, levels), length_rows=fold.fitted).model
-    return FittedModel(Cascade([found.length_stage]), found.cold_drive, found.sign, None)
+    return FittedModel(Cascade([found.require_length_stage()]), found.cold_drive, found.sign, None)
 
 
-def _two_stage(kind, levels, fold):
+def _two_stage(kind: str, levels: int, fold: Fold) -> FittedModel:
     """Fit both stages of one kind; H1 has half as many levels."""
     found = identify(
         fold.length, fold.force, operator='two-stage' if kind == 'preisach' else kind,
         levels=(max(1, levels // 2), levels), length_rows=fold.fitted).model
-    return FittedModel(Cascade([found.force_stage, found.length_stage]), found.cold_drive, 1,
-                       fold.length.load)
+    stages = [stage for stage in (found.force_stage, found.length_stage) if stage is not None]
+    return FittedModel(Cascade(stages), found.cold_drive, 1, fold.length.load)
 
 
-def _embedded_line(fold):
+def _embedded_line(fold: Fold) -> FittedModel:
     operator, _ = fit_embedded_line(fold.length, fold.force, fitted=fold.fitted)
     return _model(operator, fold.length, load=fold.length.load)
 
 
-def _additive(fold):
+def _additive(fold: Fold) -> FittedModel:
     return _model(fit_additive(fold.length)[0], fold.length, load=fold.length.load)

@@ -12,16 +12,23 @@ standard error above 0. Of ratios, because a part that has to be extrapolated wo
 all others. What has a larger error than a model with no more parameters is never advised.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.errors import IdentificationError
-from hysteresis_ros.identification.candidates import Candidate, Fold, candidates, inputs_of
+from hysteresis_ros.identification.candidates import (
+    Candidate, candidates, FittedModel, Fold, inputs_of)
 from hysteresis_ros.identification.least_squares import folds_of
 from hysteresis_ros.identification.operators import thinned
 from hysteresis_ros.identification.timing import time_per_step
+
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
 
 # Rows of the length table that are looked at: about so many, and every turning point.
 MOST_ROWS = 3000
@@ -92,7 +99,7 @@ class Choice:
     parts: str
     folds: int
 
-    def to_json(self) -> dict:
+    def to_dict(self) -> dict:
         """Return plain types for JSON."""
         percent = 100.0 / self.span
         return {
@@ -109,7 +116,8 @@ class Choice:
             'left_out': self.left_out, 'best': self.best.name, 'simplest': self.simplest.name}
 
 
-def compare_operators(length, force=None, chosen: list[Candidate] | None = None,
+def compare_operators(length: Measurement, force: Measurement | None = None,
+                      chosen: list[Candidate] | None = None,
                       progress: Callable = lambda items, total: items) -> Choice:
     """
     Fit operators with parts of a length table held out, and say what they cost.
@@ -166,7 +174,7 @@ def _alike(errors: np.ndarray, smallest: np.ndarray, least: float) -> bool:
     return bool(np.mean(ratios) <= np.std(ratios, ddof=1) / np.sqrt(len(ratios)))
 
 
-def _reduced(length):
+def _reduced(length: Measurement) -> Measurement:
     """Return the table with about `MOST_ROWS` rows, every turning point among them."""
     if length.rows <= MOST_ROWS:
         return length
@@ -177,7 +185,8 @@ def _reduced(length):
     return length.where(np.concatenate(kept))
 
 
-def _score(candidate, table, force, masks, parts):
+def _score(candidate: Candidate, table: Measurement, force: Measurement | None,
+           masks: Sequence[np.ndarray], parts: str) -> Score:
     """Fit a candidate without each part in turn, and return its row of the table."""
     measured = table.column(table.response)
     held_out, fitted, errors = 0.0, 0.0, []
@@ -199,7 +208,7 @@ def _score(candidate, table, force, masks, parts):
                  1e6 * simulate, 1e6 * invert)
 
 
-def _simulated(model, inputs):
+def _simulated(model: FittedModel, inputs: np.ndarray) -> np.ndarray:
     """Return the outputs of one trial without that of the cold state, shape (rows,)."""
     model.operator.reset()
     return model.operator.simulate(inputs)[1:]

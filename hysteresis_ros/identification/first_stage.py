@@ -102,7 +102,7 @@ def first_stage_from_lengths(
         scale = np.append(cell_areas(nodes), np.diff(nodes))
         root = smoothness(nodes, reversible=True)
 
-        def rmse(fitted, predicted):
+        def rmse(fitted: np.ndarray, predicted: np.ndarray) -> float:
             weights, bias, _ = quick_weights(
                 rows[fitted], target[fitted], scale, STRENGTH * root.T @ root)
             return float(np.sqrt(np.mean((rows @ weights + bias - target)[predicted] ** 2)))

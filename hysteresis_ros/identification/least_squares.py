@@ -163,7 +163,9 @@ class _Problem:
     sign: int
 
     @classmethod
-    def build(cls, rows, target, groups, scale, penalty, sign, anchor):
+    def build(cls, rows: np.ndarray, target: np.ndarray, groups: np.ndarray | None,
+              scale: np.ndarray | None, penalty: np.ndarray | None, sign: int,
+              anchor: Anchor | None) -> '_Problem':
         rows = np.asarray(rows, dtype=float)
         target = np.asarray(target, dtype=float)
         if rows.ndim != 2 or target.shape != rows.shape[:1] or 0 in rows.shape:
@@ -241,7 +243,7 @@ class _Problem:
         return np.array([np.sqrt(np.mean((self.design @ x - self.target) ** 2))
                          for x in self._path(strengths, everything)])
 
-    def _path(self, strengths, rows):
+    def _path(self, strengths: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
         """Return the solutions for some rows; each starts from its stronger neighbour's."""
         curvature, passive, path = self.penalty.T @ self.penalty, None, []
         gram, moment = self._moments(rows)
@@ -251,12 +253,14 @@ class _Problem:
             path.append(x)
         return path[::-1]
 
-    def _moments(self, rows):
+    def _moments(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the mean Gram matrix and the mean of design times target."""
         design, target = self.design[rows], self.target[rows]
         return design.T @ design / len(target), design.T @ target / len(target)
 
-    def regularised(self, strength, strengths=(), validation=(), held_out=None) -> WeightFit:
+    def regularised(self, strength: float, strengths: Sequence[float] | np.ndarray = (),
+                    validation: Sequence[float] | np.ndarray = (),
+                    held_out: np.ndarray | None = None) -> WeightFit:
         """Fit all rows; `held_out` are errors of held-out rows, shape (M,), if there are any."""
         gram, moment = self._moments(np.ones(len(self.target), dtype=bool))
         gram += strength * self.penalty.T @ self.penalty
@@ -282,7 +286,8 @@ class _Problem:
         polished[passive] = linalg.lstsq(design, target, lapack_driver='gelsy')[0]
         return np.where(self.free, polished, np.maximum(polished, 0.0))
 
-    def _result(self, x, passive, covariance, noise, strength, strengths, validation):
+    def _result(self, x: np.ndarray, passive: np.ndarray, covariance: np.ndarray, noise: float,
+                strength: float, strengths: np.ndarray, validation: np.ndarray) -> WeightFit:
         weights = x[:-1] * self.unit[:-1]
         bias = float(x[-1] * self.unit[-1] + self.anchor.value - self.anchor.row @ weights)
         triangle = self._reduced[0]

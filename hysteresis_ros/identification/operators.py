@@ -3,6 +3,7 @@
 """One operator of each kind fitted to inputs and outputs, trial by trial."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -77,7 +78,8 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
     low, high = low - margin, high + margin
     if fitted is None:
         fitted = np.ones(len(target), dtype=bool)
-    options = {'groups': groups, 'strength': strength, 'strengths': strengths, 'fitted': fitted}
+    options: dict[str, Any] = {
+        'groups': groups, 'strength': strength, 'strengths': strengths, 'fitted': fitted}
     if kind == 'preisach':
         nodes = np.linspace(low, high, levels + 1)
         if placed:
@@ -143,8 +145,11 @@ def preisach_rows(nodes: np.ndarray, inputs: np.ndarray, reversible: bool = Fals
     return np.hstack([rows, signed_lengths(nodes, inputs)]) if reversible else rows
 
 
-def fit_preisach(parts, target, nodes, *, groups=None, anchor=None, reversible=True,
-                 strength=None, strengths=None, fitted=slice(None)) -> tuple[Preisach, WeightFit]:
+def fit_preisach(parts: Sequence[np.ndarray], target: np.ndarray, nodes: np.ndarray, *,
+                 groups: np.ndarray | None = None, anchor: tuple[float, float] | None = None,
+                 reversible: bool = True, strength: float | None = None,
+                 strengths: Sequence[float] | None = None,
+                 fitted: np.ndarray | slice = slice(None)) -> tuple[Preisach, WeightFit]:
     """Fit a Preisach operator on a given grid; the parameters are those of `fit_operator`."""
     rows = np.concatenate([preisach_rows(nodes, part, reversible)[1:] for part in parts])[fitted]
     known = None if anchor is None else Anchor(
@@ -158,7 +163,7 @@ def fit_preisach(parts, target, nodes, *, groups=None, anchor=None, reversible=T
                     fit.weights[count:] if reversible else None), fit
 
 
-def _scale(nodes, reversible):
+def _scale(nodes: np.ndarray, reversible: bool) -> np.ndarray:
     """Sizes of the cells, and of the diagonal's intervals."""
     areas = cell_areas(nodes)
     return np.append(areas, np.diff(nodes)) if reversible else areas
@@ -180,12 +185,13 @@ def thinned(drive: np.ndarray, most: int) -> np.ndarray:
     return np.flatnonzero(keep)
 
 
-def _kept(parts):
+def _kept(parts: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Return the rows of each part that a search looks at, about `SEARCH_ROWS` of them."""
     return [thinned(part, max(1, SEARCH_ROWS // len(parts))) for part in parts]
 
 
-def _fewer(parts, target, fitted):
+def _fewer(parts: Sequence[np.ndarray], target: np.ndarray,
+           fitted: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
     """Return the inputs and outputs of the rows kept, and which of them are fitted."""
     kept = _kept(parts)
     # Row n of a part is output n - 1 of its trial.
@@ -194,7 +200,8 @@ def _fewer(parts, target, fitted):
     return [part[rows] for part, rows in zip(parts, kept)], target[outputs], fitted[outputs]
 
 
-def _placed(parts, target, nodes, reversible, fitted):
+def _placed(parts: Sequence[np.ndarray], target: np.ndarray, nodes: np.ndarray, reversible: bool,
+            fitted: np.ndarray) -> np.ndarray:
     """
     Return the grid, of those reaching a little beyond `nodes`, that fits the rows best.
 
@@ -217,7 +224,8 @@ def _placed(parts, target, nodes, reversible, fitted):
     return grids[int(np.argmin(errors))]
 
 
-def _play(parts, target, low, high, levels, options):
+def _play(parts: Sequence[np.ndarray], target: np.ndarray, low: float, high: float, levels: int,
+          options: dict[str, Any]) -> tuple[HysteresisOperator, WeightFit]:
     fitted, groups = options.pop('fitted'), options.pop('groups')
     radii = np.linspace(0.0, 0.5 * (high - low), levels + 1)[:-1]
     columns = []
@@ -233,4 +241,4 @@ def _play(parts, target, low, high, levels, options):
     scale = np.maximum(np.ptp(rows, axis=0), 1e-12 * (high - low))
     fit = fit_weights(rows, target[fitted], groups=groups[fitted], scale=scale, sign=1,
                       slack=SLACK, **options)
-    return PrandtlIshlinskii(radii, fit.weights, fit.bias, low, high), fit
+    return PrandtlIshlinskii(radii.tolist(), fit.weights.tolist(), fit.bias, low, high), fit

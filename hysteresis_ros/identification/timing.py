@@ -2,15 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a model costs: seconds for a row of a sequence, and for a scalar inverse."""
 
+from __future__ import annotations
+
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from hysteresis_ros.operators import Additive, Cascade
 
 # Rows that the inverse is timed on, after so many to warm up, and how often each time is taken.
 ROWS, WARM_UP, REPEATS = 300, 20, 10
 
 
-def time_per_step(operator, inputs: np.ndarray, outputs: np.ndarray) -> tuple[float, float]:
+def time_per_step(operator: Additive | Cascade, inputs: np.ndarray,
+                  outputs: np.ndarray) -> tuple[float, float]:
     """
     Return the seconds that a row takes: simulated in a sequence, and inverted and committed.
 

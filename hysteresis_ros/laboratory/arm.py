@@ -8,6 +8,7 @@ arm follows at once unless it has inertia; with friction it sticks until the wir
 """
 
 import collections
+from collections.abc import Callable, Sequence
 import functools
 import math
 
@@ -60,7 +61,7 @@ class Arm:
         Tension of each different wire [N].
     """
 
-    def __init__(self, conditions: Conditions, seed=0):
+    def __init__(self, conditions: Conditions, seed: int | Sequence[int] = 0) -> None:
         self.conditions = conditions
         self.muscle = ParallelWires(conditions)
         self._rng = np.random.default_rng(seed)
@@ -208,11 +209,11 @@ class Arm:
             resistance = math.copysign(conditions.coulomb, surplus)
         damping = conditions.viscous / dt
 
-        def needed(theta):
+        def needed(theta: float) -> float:
             return self._needed(theta) + resistance - damping * (theta - old)
         self._rest_where(needed, old)
 
-    def _rest_where(self, needed, guess: float) -> None:
+    def _rest_where(self, needed: Callable[[float], float], guess: float) -> None:
         """Bring the arm to the angle at which the wires hold the moment `needed`."""
         linkage, wires = self.conditions.linkage, self.muscle.wires
         highest = HIGHEST_ANGLE
@@ -223,7 +224,7 @@ class Arm:
         if len(wires) == 1:
             wire, temperature, count = wires[0], self.temperature, self.muscle.count
 
-            def tension(theta):
+            def tension(theta: float) -> float:
                 return max(needed(theta) / (count * linkage.moment_arm(theta)), 0.0)
 
             self.angle = self._find(

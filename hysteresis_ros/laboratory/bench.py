@@ -6,7 +6,11 @@ The bench of Fig. 6: one wire in its fan, held at its resting length or under a 
 Voltages are held for 30 s, so that Eq. 1 has come to rest within a quarter of a percent.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +21,9 @@ from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.solve import RootFinder
 from hysteresis_ros.laboratory.wire import (
     LARGEST_TENSION, LENGTH_TOLERANCE, steps_between, TYPICAL_COMPLIANCE)
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 # Stiffness of load cell, capstan and servo motor [N/m].
 BENCH_STIFFNESS = 5e3
@@ -37,12 +44,12 @@ class Bench:
         Of the sensors' noise and the air's fluctuations.
     """
 
-    def __init__(self, conditions: Conditions, seed=0):
+    def __init__(self, conditions: Conditions, seed: int | Sequence[int] = 0) -> None:
         self.conditions = conditions
         self._muscle = ParallelWires(conditions)
         self._rng = np.random.default_rng(seed)
 
-    def force_trial(self, voltages, hold: float = HOLD) -> np.ndarray:
+    def force_trial(self, voltages: ArrayLike, hold: float = HOLD) -> np.ndarray:
         """
         Measure the force of the wire held at its resting length (Fig. 3a).
 
@@ -61,7 +68,7 @@ class Bench:
         wire, pretension = self._muscle.wires[0], self.conditions.material.pretension
         find = RootFinder(TYPICAL_COMPLIANCE, LENGTH_TOLERANCE)
 
-        def clamped(temperature, before):
+        def clamped(temperature: float, before: float) -> float:
             # The wire is clamped at the resting length under its pretension; the bench gives.
             return find(
                 lambda force: wire.elongation(temperature, force)
@@ -70,7 +77,7 @@ class Bench:
         return np.array([sensors.load_cell(force, self._rng)
                          for force in self._hold(voltages, hold, clamped, pretension)])
 
-    def length_trial(self, voltages, load: float, hold: float = HOLD) -> np.ndarray:
+    def length_trial(self, voltages: ArrayLike, load: float, hold: float = HOLD) -> np.ndarray:
         """
         Measure the elongation of the wire under a dead weight (Fig. 3b).
 
@@ -93,7 +100,8 @@ class Bench:
             lengths.append(wire.elongation(self._temperature, load))
         return np.array([sensors.position_sensor(length, self._rng) for length in lengths])
 
-    def _hold(self, voltages, hold, equilibrium, tension):
+    def _hold(self, voltages: ArrayLike, hold: float, equilibrium: Callable[[float, float], float],
+              tension: float) -> Iterator[float]:
         """Heat and cool, then hold each voltage and yield the tension at its end."""
         conditions, heat, muscle = self.conditions, self.conditions.heat, self._muscle
         muscle.heat_and_cool(ROOM, tension)

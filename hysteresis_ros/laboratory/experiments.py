@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from hysteresis_ros.atomic import write_text
+from hysteresis_ros.atomic import AnyPath, write_text
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import sequences
 from hysteresis_ros.laboratory.bench import HOLD
@@ -60,7 +60,7 @@ def arm_step_tables(effects: Mapping[str, float], seed: int,
     kinds = (sequences.sinusoid, sequences.random_moves, sequences.staircase,
              sequences.up_and_down)
 
-    def record(recording):
+    def record(recording: int) -> list[Table]:
         rng = np.random.default_rng([seed, recording, 22])
         plant = Plant(seed, effects, recording=recording, muscle=muscle,
                       recording_time=HOLD * ARM_STEPS * len(kinds))
@@ -74,7 +74,7 @@ def arm_dynamic_tables(effects: Mapping[str, float], seed: int,
     kinds = (sequences.steps_of_all_speeds, sequences.repeated_loop, sequences.ramps,
              sequences.long_holds)
 
-    def record(recording):
+    def record(recording: int) -> list[Table]:
         rng = np.random.default_rng([seed, recording, 23])
         runs = [kind(rng) for kind in kinds]
         plant = Plant(seed, effects, heat_time_constant=BRISK, recording=recording,
@@ -134,7 +134,7 @@ def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
     return EXPERIMENTS[name](effects or {}, seed, muscle)
 
 
-def write_experiment(name: str, directory, effects: Mapping[str, float] | None = None,
+def write_experiment(name: str, directory: AnyPath, effects: Mapping[str, float] | None = None,
                      seed: int = 0, muscle: str = 'grains') -> list[Path]:
     """
     Carry an experiment out and write its tables.

@@ -87,7 +87,7 @@ class Grains:
         Temperatures at which the grains turn to austenite and back [degC], from the distribution.
     """
 
-    def __init__(self, heating: np.ndarray, cooling: np.ndarray):
+    def __init__(self, heating: np.ndarray, cooling: np.ndarray) -> None:
         self._upper = heating / SMEAR + 0.5
         self._lower = cooling / SMEAR + 0.5
         self._share = np.ones(len(heating))

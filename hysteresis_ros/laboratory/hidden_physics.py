@@ -11,18 +11,22 @@ is drawn within 15 % for each specimen. Where `signed`, a negative strength turn
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
-from hysteresis_ros.laboratory.unlisted import UNLISTED
+from hysteresis_ros.laboratory.unlisted import Unlisted, UNLISTED
 
 # Specimens differ in an effect's size by up to this share.
 SPREAD = 0.15
 # Enthalpy of the transformation [J/kg].
 ENTHALPY = 24e3
+
+# Changes conditions: (conditions, size, specimen, recording).
+Apply = Callable[[Conditions, float, np.random.Generator, np.random.Generator], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,139 +51,167 @@ class Effect:
     """
 
     sentence: str
-    apply: Callable
+    apply: Apply
     signed: bool = False
     bench: bool = False
     listed: bool = True
 
 
-def _supply_sag(conditions, size, specimen, recording):
+def _supply_sag(conditions: Conditions, size: float, specimen: np.random.Generator,
+                recording: np.random.Generator) -> None:
     conditions.lead_resistance = 0.9 * size
 
 
-def _pwm_dead_zone(conditions, size, specimen, recording):
+def _pwm_dead_zone(conditions: Conditions, size: float, specimen: np.random.Generator,
+                   recording: np.random.Generator) -> None:
     conditions.dead_voltage = 1.0 * size
 
 
-def _resistance_change(conditions, size, specimen, recording):
+def _resistance_change(conditions: Conditions, size: float, specimen: np.random.Generator,
+                       recording: np.random.Generator) -> None:
     conditions.resistance_growth = 0.17 * size
 
 
-def _thermal_lag(conditions, size, specimen, recording):
+def _thermal_lag(conditions: Conditions, size: float, specimen: np.random.Generator,
+                 recording: np.random.Generator) -> None:
     conditions.heat.time_constant = max(conditions.heat.time_constant, 6.0 * size)
 
 
-def _heating_cooling_asymmetry(conditions, size, specimen, recording):
+def _heating_cooling_asymmetry(conditions: Conditions, size: float, specimen: np.random.Generator,
+                               recording: np.random.Generator) -> None:
     conditions.heat.time_constant = max(conditions.heat.time_constant, 3.0)
     conditions.heat.heating_ratio = 2.0 ** (0.87 * size)
 
 
-def _latent_heat(conditions, size, specimen, recording):
+def _latent_heat(conditions: Conditions, size: float, specimen: np.random.Generator,
+                 recording: np.random.Generator) -> None:
     conditions.heat.time_constant = max(conditions.heat.time_constant, 2.0)
     conditions.heat.latent = ENTHALPY / SPECIFIC_HEAT * size
 
 
-def _ambient_temperature(conditions, size, specimen, recording):
+def _ambient_temperature(conditions: Conditions, size: float, specimen: np.random.Generator,
+                         recording: np.random.Generator) -> None:
     conditions.air.swing = 12.0 * size
     conditions.air.period = 0.45 * conditions.recording_time
     conditions.air.phase = recording.uniform(0.0, 2.0 * math.pi)
 
 
-def _ambient_drift(conditions, size, specimen, recording):
+def _ambient_drift(conditions: Conditions, size: float, specimen: np.random.Generator,
+                   recording: np.random.Generator) -> None:
     conditions.air.warming = 15.0 * size
     conditions.air.warming_time = 0.6 * conditions.recording_time
 
 
-def _airflow(conditions, size, specimen, recording):
+def _airflow(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     factor = 1.0 + 0.35 * abs(size)
     conditions.heat.airflow *= factor if size > 0.0 else 1.0 / factor
 
 
-def _stress_dependence(conditions, size, specimen, recording):
+def _stress_dependence(conditions: Conditions, size: float, specimen: np.random.Generator,
+                       recording: np.random.Generator) -> None:
     factor = 1.0 + 0.35 * abs(size)
     conditions.material = conditions.material.with_slopes(
         1.0 / factor if size > 0.0 else factor)
 
 
-def _stress_dependent_strain(conditions, size, specimen, recording):
+def _stress_dependent_strain(conditions: Conditions, size: float, specimen: np.random.Generator,
+                             recording: np.random.Generator) -> None:
     conditions.material = conditions.material.with_strain_growth(1.0 + 0.5 * size)
 
 
-def _r_phase(conditions, size, specimen, recording):
+def _r_phase(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     conditions.material = conditions.material.with_early_phase(0.0085 * size)
 
 
-def _creep(conditions, size, specimen, recording):
+def _creep(conditions: Conditions, size: float, specimen: np.random.Generator,
+           recording: np.random.Generator) -> None:
     conditions.creep = 0.004 * size
 
 
-def _fatigue(conditions, size, specimen, recording):
+def _fatigue(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     conditions.shrinkage = 0.0025 * size
     conditions.tiring = 0.02 * size
 
 
-def _slack(conditions, size, specimen, recording):
+def _slack(conditions: Conditions, size: float, specimen: np.random.Generator,
+           recording: np.random.Generator) -> None:
     conditions.dead_length = 0.0035 * size
 
 
-def _series_compliance(conditions, size, specimen, recording):
+def _series_compliance(conditions: Conditions, size: float, specimen: np.random.Generator,
+                       recording: np.random.Generator) -> None:
     conditions.compliance = size / 2500.0
 
 
-def _unequal_muscles(conditions, size, specimen, recording):
+def _unequal_muscles(conditions: Conditions, size: float, specimen: np.random.Generator,
+                     recording: np.random.Generator) -> None:
     conditions.wire_offsets = (-0.004 * size, 0.0, 0.004 * size)
 
 
-def _coulomb_friction(conditions, size, specimen, recording):
+def _coulomb_friction(conditions: Conditions, size: float, specimen: np.random.Generator,
+                      recording: np.random.Generator) -> None:
     conditions.coulomb = 0.08 * size
 
 
-def _viscous_friction(conditions, size, specimen, recording):
+def _viscous_friction(conditions: Conditions, size: float, specimen: np.random.Generator,
+                      recording: np.random.Generator) -> None:
     conditions.viscous = 2.5 * size
 
 
-def _inertia(conditions, size, specimen, recording):
+def _inertia(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     conditions.inertia = 0.03 * size
 
 
-def _change_linkage(conditions, **values):
+def _change_linkage(conditions: Conditions, **values: Any) -> None:
     conditions.linkage = dataclasses.replace(conditions.linkage, **values)
 
 
-def _payload_error(conditions, size, specimen, recording):
+def _payload_error(conditions: Conditions, size: float, specimen: np.random.Generator,
+                   recording: np.random.Generator) -> None:
     _change_linkage(conditions, payload_mass=conditions.linkage.payload_mass + 0.050 * size)
 
 
-def _clamp_mass(conditions, size, specimen, recording):
+def _clamp_mass(conditions: Conditions, size: float, specimen: np.random.Generator,
+                recording: np.random.Generator) -> None:
     _change_linkage(conditions, clamp_mass=0.026 * size, clamp_radius=0.05, clamp_phase=0.3)
 
 
-def _geometry_error(conditions, size, specimen, recording):
+def _geometry_error(conditions: Conditions, size: float, specimen: np.random.Generator,
+                    recording: np.random.Generator) -> None:
     linkage = conditions.linkage
     _change_linkage(conditions, clamp_distance=linkage.clamp_distance + 0.0025 * size,
                     anchor_height=linkage.anchor_height + 0.0015 * size)
 
 
-def _frame_tilt(conditions, size, specimen, recording):
+def _frame_tilt(conditions: Conditions, size: float, specimen: np.random.Generator,
+                recording: np.random.Generator) -> None:
     _change_linkage(conditions, tilt=math.radians(18.0) * size)
 
 
-def _end_stop(conditions, size, specimen, recording):
+def _end_stop(conditions: Conditions, size: float, specimen: np.random.Generator,
+              recording: np.random.Generator) -> None:
     lowered, raised = conditions.material.arm_range
     cut = 0.25 * abs(size) * (lowered - raised)
     conditions.stop_side = 1 if size > 0.0 else -1
     conditions.stop = math.radians(lowered - cut if size > 0.0 else raised + cut)
 
 
-def _encoder_offset(conditions, size, specimen, recording):
+def _encoder_offset(conditions: Conditions, size: float, specimen: np.random.Generator,
+                    recording: np.random.Generator) -> None:
     conditions.encoder_offset = math.radians(9.0) * size
 
 
-def _backlash(conditions, size, specimen, recording):
+def _backlash(conditions: Conditions, size: float, specimen: np.random.Generator,
+              recording: np.random.Generator) -> None:
     conditions.backlash = math.radians(8.0) * size
 
 
-def _latency(conditions, size, specimen, recording):
+def _latency(conditions: Conditions, size: float, specimen: np.random.Generator,
+             recording: np.random.Generator) -> None:
     conditions.latency = 2.0 * size
 
 
@@ -230,13 +262,14 @@ LISTED = {
 }
 
 
-def _disturb(kind):
-    def apply(conditions, size, specimen, recording):
+def _disturb(kind: type[Unlisted]) -> Apply:
+    def apply(conditions: Conditions, size: float, specimen: np.random.Generator,
+              recording: np.random.Generator) -> None:
         conditions.disturbances.append(kind(size, conditions, specimen, recording))
     return apply
 
 
-EFFECTS = {**LISTED, **{name: Effect(kind.__doc__, _disturb(kind), listed=False)
+EFFECTS = {**LISTED, **{name: Effect(kind.__doc__ or '', _disturb(kind), listed=False)
                         for name, kind in UNLISTED.items()}}
 
 

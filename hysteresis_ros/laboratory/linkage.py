@@ -60,14 +60,18 @@ class Linkage:
     resting_length: float = GEOMETRY['resting_length']
     payload_mass: float = GEOMETRY['payload_mass']
     forearm_mass: float = GEOMETRY['forearm_mass']
-    muscle_count: int = GEOMETRY['muscle_count']
+    muscle_count: int = int(GEOMETRY['muscle_count'])
     gravity: float = GEOMETRY['gravity']
     clamp_mass: float = 0.0
     clamp_radius: float = 0.0
     clamp_phase: float = 0.0
     tilt: float = 0.0
+    _lead: float = dataclasses.field(init=False, repr=False)
+    _squares: float = dataclasses.field(init=False, repr=False)
+    _product: float = dataclasses.field(init=False, repr=False)
+    _weight: float = dataclasses.field(init=False, repr=False)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         radius = math.hypot(self.clamp_distance, self.clamp_height)
         set_once = object.__setattr__
         set_once(self, '_lead', math.atan2(self.clamp_height, self.clamp_distance))

@@ -31,7 +31,7 @@ class ParallelWires:
         Full transformations there and back since the muscle was new.
     """
 
-    def __init__(self, conditions: Conditions):
+    def __init__(self, conditions: Conditions) -> None:
         self._conditions = conditions
         self.wires = [conditions.material.wire() for _ in conditions.wire_offsets]
         self.count = conditions.linkage.muscle_count

@@ -15,7 +15,10 @@ wires stays, while every trial starts from the cold state after a full heat and 
 recording is made on an arm of the same build with fresh wires.
 """
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,6 +33,9 @@ from hysteresis_ros.laboratory.heat import HeatBalance
 from hysteresis_ros.laboratory.hidden_physics import apply_effects
 from hysteresis_ros.laboratory.lagoudas import LagoudasMaterial
 from hysteresis_ros.laboratory.wire import Material
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 # Time constants of Eq. 1 [s]: in the paper, and in continuous recordings.
 PAPER, BRISK = 5.0, 0.02
@@ -88,7 +94,7 @@ class Plant:
 
     def __init__(self, seed: int = 0, effects: Mapping[str, float] | None = None,
                  heat_time_constant: float = PAPER, recording: int = 0,
-                 recording_time: float = 900.0, muscle: str = 'grains'):
+                 recording_time: float = 900.0, muscle: str = 'grains') -> None:
         if seed < 0 or recording < 0:
             raise ParameterError(f'laboratory: seeds must not be negative, not {seed}, {recording}')
         if not (heat_time_constant > 0.0 and recording_time > 0.0):
@@ -105,15 +111,15 @@ class Plant:
         self.arm = Arm(conditions, seed=[seed, recording, 12])
         self._rng = np.random.default_rng([seed, recording, 13])
 
-    def force_trial(self, voltages) -> np.ndarray:
+    def force_trial(self, voltages: ArrayLike) -> np.ndarray:
         """Return the settled forces [N] of the wire at its resting length, from the cold state."""
         return self.bench.force_trial(voltages)
 
-    def length_trial(self, voltages, load: float) -> np.ndarray:
+    def length_trial(self, voltages: ArrayLike, load: float) -> np.ndarray:
         """Return the settled elongations [m] under a load [N], from the cold state."""
         return self.bench.length_trial(voltages, load)
 
-    def arm_trial(self, voltages, hold: float = HOLD) -> dict[str, np.ndarray]:
+    def arm_trial(self, voltages: ArrayLike, hold: float = HOLD) -> dict[str, np.ndarray]:
         """
         Hold each voltage and measure the arm at the end of it, from the cold state.
 
@@ -137,7 +143,7 @@ class Plant:
             rows.append(self._read())
         return self._columns(hold * np.arange(1, len(voltages) + 1), voltages, rows)
 
-    def arm_run(self, time, voltage) -> dict[str, np.ndarray]:
+    def arm_run(self, time: ArrayLike, voltage: ArrayLike) -> dict[str, np.ndarray]:
         """
         Record the arm continuously, from the cold state.
 
@@ -170,7 +176,8 @@ class Plant:
                 sensors.supply_meter(self._rng))
 
     @staticmethod
-    def _columns(time, voltage, rows) -> dict[str, np.ndarray]:
+    def _columns(time: ArrayLike, voltage: ArrayLike,
+                 rows: Sequence[tuple[float, float, float]]) -> dict[str, np.ndarray]:
         angle, ambient, supply = np.array(rows).reshape(-1, 3).T
         return {'time': time, 'voltage': voltage, 'angle': angle,
                 'ambient_temperature': ambient, 'supply_voltage': supply}

@@ -50,7 +50,8 @@ def staircase(count: int, rng: np.random.Generator) -> np.ndarray:
 
 def up_and_down(count: int, rng: np.random.Generator) -> np.ndarray:
     """Return ramps between random turning points [V]."""
-    voltages, here = [], rng.uniform(LOW, 3.4)
+    voltages: list[float] = []
+    here = rng.uniform(LOW, 3.4)
     rising = True
     while len(voltages) < count:
         there = rng.uniform(4.2, HIGHEST) if rising else rng.uniform(LOW, 3.8)
@@ -66,7 +67,7 @@ def _samples(seconds: float) -> int:
 
 def steps_of_all_speeds(rng: np.random.Generator, seconds: float = 240.0) -> np.ndarray:
     """Return random levels, some held for a second, some for a quarter of a minute [V]."""
-    voltages = []
+    voltages: list[float] = []
     while len(voltages) < _samples(seconds):
         hold = float(np.exp(rng.uniform(np.log(1.0), np.log(16.0))))
         level = float(random_moves(1, rng)[0])
@@ -76,7 +77,8 @@ def steps_of_all_speeds(rng: np.random.Generator, seconds: float = 240.0) -> np.
 
 def ramps(rng: np.random.Generator, seconds: float = 220.0) -> np.ndarray:
     """Return ramps between random turning points, from 0.05 to 2 V/s [V]."""
-    voltages, here, rising = [], 0.0, True
+    voltages: list[float] = []
+    here, rising = 0.0, True
     while len(voltages) < _samples(seconds):
         there = rng.uniform(4.3, HIGHEST) if rising else rng.uniform(2.0, 3.7)
         rate = float(np.exp(rng.uniform(np.log(0.05), np.log(2.0))))
@@ -90,7 +92,7 @@ def ramps(rng: np.random.Generator, seconds: float = 220.0) -> np.ndarray:
 def repeated_loop(rng: np.random.Generator, repeats: int = 6) -> np.ndarray:
     """Return the same loop again and again, with a hold at its middle going up and down [V]."""
     low, middle, high = rng.uniform(2.3, 2.8), rng.uniform(3.8, 4.2), rng.uniform(5.2, 5.8)
-    loop = []
+    loop: list[float] = []
     for start, end in ((low, middle), (middle, high), (high, middle), (middle, low)):
         loop.extend(np.linspace(start, end, _samples(6.0) + 1)[1:])
         loop.extend([end] * _samples(4.0))

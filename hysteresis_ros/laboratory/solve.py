@@ -22,7 +22,7 @@ class RootFinder:
         Absolute value below which the function counts as zero.
     """
 
-    def __init__(self, slope: float, tolerance: float):
+    def __init__(self, slope: float, tolerance: float) -> None:
         self._slope = slope
         self._tolerance = tolerance
 

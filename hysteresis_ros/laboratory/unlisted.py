@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.laboratory.conditions import Disturbance
+from hysteresis_ros.laboratory.conditions import Conditions, Disturbance
 
 
 class Events:
@@ -28,7 +28,7 @@ class Events:
         Random generator.
     """
 
-    def __init__(self, count: float, duration: float, rng: np.random.Generator):
+    def __init__(self, count: float, duration: float, rng: np.random.Generator) -> None:
         gaps = rng.exponential(1.0, size=int(8 * count) + 8) + 0.3
         self.times = np.cumsum(gaps) * duration / (1.3 * count)
         self.signs = np.where(rng.random(len(gaps)) < 0.5, -1.0, 1.0)
@@ -57,24 +57,25 @@ class Unlisted(Disturbance):
         Random generators for what belongs to the arm, and for what differs between recordings.
     """
 
-    def __init__(self, size, conditions, specimen, recording):
+    def __init__(self, size: float, conditions: Conditions, specimen: np.random.Generator,
+                 recording: np.random.Generator) -> None:
         self.size = size
         self.linkage = conditions.linkage
         self.duration = conditions.recording_time
         self.prepare(specimen, recording)
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the random numbers that the effect needs."""
 
 
 class StiffeningCable(Unlisted):
     """A cable to the forearm stiffens as the arm rises."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw from which angle on the cable pulls."""
         self._start = math.radians(specimen.uniform(122.0, 130.0))
 
-    def moment(self, time, theta):
+    def moment(self, time: float, theta: float) -> float:
         """Pull the arm down with the square of how far it has risen."""
         return 0.6 * self.size * max(self._start - theta, 0.0) ** 2
 
@@ -82,11 +83,11 @@ class StiffeningCable(Unlisted):
 class SlippingCrimp(Unlisted):
     """A crimp gives way once; from then on the wires are longer."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the moment."""
         self._moment = recording.uniform(0.3, 0.6) * self.duration
 
-    def excess(self, time, tension):
+    def excess(self, time: float, tension: float) -> float:
         """Be longer from the moment on."""
         return 0.004 * self.size if time > self._moment else 0.0
 
@@ -94,12 +95,12 @@ class SlippingCrimp(Unlisted):
 class SkippingEncoder(Unlisted):
     """The encoder now and then skips counts, either way."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the moments."""
         self._events = Events(12.0, self.duration, recording)
         self._sums = np.r_[0.0, np.cumsum(self._events.signs)]
 
-    def reading(self, time, theta):
+    def reading(self, time: float, theta: float) -> float:
         """Be off by all counts skipped so far."""
         return math.radians(3.0) * self.size * float(self._sums[self._events.passed(time)])
 
@@ -107,13 +108,13 @@ class SkippingEncoder(Unlisted):
 class SwingingLoad(Unlisted):
     """The weight hangs on a string; draughts set it swinging again and again."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw when it is pushed, and its string's length."""
         self._events = Events(20.0, self.duration, recording)
         self._pulsation = math.sqrt(9.81 / specimen.uniform(0.2, 0.4))
         self._decay = 0.1 * self.duration
 
-    def moment(self, time, theta):
+    def moment(self, time: float, theta: float) -> float:
         """Weigh more and less as it swings."""
         since = self._events.since(time)
         if since == math.inf:
@@ -125,12 +126,12 @@ class SwingingLoad(Unlisted):
 class ShakenBench(Unlisted):
     """A machine nearby runs for a while, stands, and runs again."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw when it is switched."""
         self._events = Events(8.0, self.duration, recording)
         self._pulsation = 2.0 * math.pi * specimen.uniform(1.3, 2.1)
 
-    def moment(self, time, theta):
+    def moment(self, time: float, theta: float) -> float:
         """Shake all masses up and down while it runs."""
         if self._events.passed(time) % 2 == 0:
             return 0.0
@@ -141,11 +142,11 @@ class ShakenBench(Unlisted):
 class HotSurface(Unlisted):
     """At some angle the wires brush a hot surface."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the angle."""
         self._middle = math.radians(specimen.uniform(112.0, 122.0))
 
-    def warmth(self, time, theta):
+    def warmth(self, time: float, theta: float) -> float:
         """Be warmer near that angle."""
         return 22.0 * self.size * math.exp(-0.5 * ((theta - self._middle) / 0.08) ** 2)
 
@@ -153,11 +154,11 @@ class HotSurface(Unlisted):
 class Magnet(Unlisted):
     """A magnet holds the forearm near one angle."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the angle."""
         self._middle = math.radians(specimen.uniform(112.0, 122.0))
 
-    def moment(self, time, theta):
+    def moment(self, time: float, theta: float) -> float:
         """Pull towards the angle, most strongly a little off it."""
         offset = (theta - self._middle) / math.radians(6.0)
         return -0.13 * self.size * offset * math.exp(0.5 - 0.5 * offset * offset)
@@ -166,11 +167,11 @@ class Magnet(Unlisted):
 class LooseSetScrew(Unlisted):
     """The hub of the encoder jumps to and fro on its shaft, at random moments."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the moments."""
         self._events = Events(9.0, self.duration, recording)
 
-    def reading(self, time, theta):
+    def reading(self, time: float, theta: float) -> float:
         """Be off after every other jump."""
         return -math.radians(7.0) * self.size * (self._events.passed(time) % 2)
 
@@ -178,11 +179,11 @@ class LooseSetScrew(Unlisted):
 class PeriodicDraught(Unlisted):
     """Air conditioning blows at the wires at regular intervals."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the interval."""
         self._period = specimen.uniform(35.0, 60.0) * max(self.duration / 900.0, 1.0)
 
-    def airflow(self, time):
+    def airflow(self, time: float) -> float:
         """Cool more during a third of each interval."""
         return 1.0 + 0.35 * self.size * (time / self._period % 1.0 < 0.33)
 
@@ -190,12 +191,12 @@ class PeriodicDraught(Unlisted):
 class EccentricDisc(Unlisted):
     """The encoder's disc sits askew: its error repeats every 30 degrees or so."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw how it sits."""
         self._waves = specimen.integers(11, 16)
         self._phase = specimen.uniform(0.0, 2.0 * math.pi)
 
-    def reading(self, time, theta):
+    def reading(self, time: float, theta: float) -> float:
         """Read too much and too little in turn."""
         return math.radians(4.5) * self.size * math.sin(self._waves * theta + self._phase)
 
@@ -203,11 +204,11 @@ class EccentricDisc(Unlisted):
 class TornWire(Unlisted):
     """One of the wires tears at some moment; the others carry its load."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the moment."""
         self._moment = recording.uniform(0.35, 0.65) * self.duration
 
-    def moment(self, time, theta):
+    def moment(self, time: float, theta: float) -> float:
         """Ask as much of the remaining wires as all of them had to give."""
         return 0.5 * self.size * self.linkage.moment(theta) if time > self._moment else 0.0
 
@@ -215,11 +216,11 @@ class TornWire(Unlisted):
 class FlexedLead(Unlisted):
     """A lead breaks strand by strand: raising the arm flexes it, and less voltage arrives."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw the angle."""
         self._middle = math.radians(specimen.uniform(112.0, 120.0))
 
-    def contact(self, time, theta):
+    def contact(self, time: float, theta: float) -> float:
         """Lose voltage above the angle."""
         return 1.0 - 0.16 * self.size / (1.0 + math.exp((theta - self._middle) / 0.03))
 
@@ -227,12 +228,12 @@ class FlexedLead(Unlisted):
 class WaterDrops(Unlisted):
     """A pipe drips on the wires."""
 
-    def prepare(self, specimen, recording):
+    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
         """Draw when a drop falls."""
         self._events = Events(18.0, self.duration, recording)
         self._drying = 0.017 * self.duration
 
-    def airflow(self, time):
+    def airflow(self, time: float) -> float:
         """Cool more until the drop is gone."""
         return 1.0 + 0.9 * self.size * math.exp(-self._events.since(time) / self._drying)
 

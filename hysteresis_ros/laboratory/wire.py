@@ -102,7 +102,7 @@ class Wire(abc.ABC):
         Of crimps and cable in series with the wire [m/N].
     """
 
-    def __init__(self, material: Material):
+    def __init__(self, material: Material) -> None:
         self.material = material
         self.retained = 0.0
         self.excess = 0.0

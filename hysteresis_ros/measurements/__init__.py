@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measurements: one table type, read from CSV files or rosbag2 recordings."""
 
+import os
 from pathlib import Path
 
 from hysteresis_ros.errors import MeasurementError
@@ -16,7 +17,8 @@ __all__ = [
     'read_csv', 'read_measurement', 'read_reference', 'settled_rows', 'write_csv']
 
 
-def read_measurement(path, namespace=None):
+def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
+                     settled: bool = False) -> Measurement:
     """
     Read a CSV file or a rosbag2 recording.
 
@@ -27,6 +29,8 @@ def read_measurement(path, namespace=None):
         files.
     namespace : str, optional
         Which arm to take from a bag that recorded several.
+    settled : bool
+        Of a continuous run take only the ends of its holds.
 
     Returns
     -------
@@ -35,12 +39,17 @@ def read_measurement(path, namespace=None):
     Raises
     ------
     MeasurementError
-        If the file is missing or is no measurement; the message says what to do.
+        If the file is missing, is no measurement or has no settled states; the message says what
+        to do.
 
     """
     path = Path(path)
     if not path.exists():
         raise MeasurementError(f'{path}: no such file or folder')
-    if is_bag(path):
-        return read_bag(path, namespace)
-    return read_csv(path)
+    found = read_bag(path, namespace) if is_bag(path) else read_csv(path)
+    reduced = settled_rows(found) if settled else found
+    if reduced is None:
+        raise MeasurementError(f'{path}: the drive is not held for {SETTLED_HOLD:.0f} s at a time, '
+                               'so there are no settled states; take the whole run, without '
+                               '"settled"')
+    return reduced

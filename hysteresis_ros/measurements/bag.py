@@ -9,12 +9,14 @@ many times real time (stamps of /clock, received in wall time) comes out right.
 """
 
 from array import array
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 import warnings
 
+from hysteresis_ros.atomic import AnyPath
 from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.measurements.bag_storage import open_bag, SUFFIXES
+from hysteresis_ros.measurements.bag_storage import open_bag, Storage, SUFFIXES
 from hysteresis_ros.measurements.cdr import (
     decode_diagnostics, decode_float64, decode_temperature, JointReader)
 from hysteresis_ros.measurements.csv import digest
@@ -54,13 +56,13 @@ class Recording(NamedTuple):
     initialising: tuple
 
 
-def is_bag(path):
+def is_bag(path: AnyPath) -> bool:
     """Tell whether a path is a recording rather than a table: a folder, or .mcap or .db3."""
     path = Path(path)
     return path.is_dir() or path.name.removesuffix('.zstd').endswith(SUFFIXES)
 
 
-def read_bag(path, namespace=None):
+def read_bag(path: AnyPath, namespace: str | None = None) -> Measurement:
     """
     Read an arm run from a rosbag2 recording.
 
@@ -102,7 +104,7 @@ def read_bag(path, namespace=None):
     return measurement
 
 
-def choose_topics(path, topics, namespace):
+def choose_topics(path: Path, topics: Mapping[str, str], namespace: str | None) -> dict[str, str]:
     """
     Choose the topics of one arm.
 
@@ -156,7 +158,7 @@ def choose_topics(path, topics, namespace):
     return found
 
 
-def collect(path, bag, topics):
+def collect(path: Path, bag: Storage, topics: Mapping[str, str]) -> Recording:
     """
     Read the messages of the chosen topics.
 
@@ -198,7 +200,7 @@ def collect(path, bag, topics):
                        for columns in (voltage, angle, ambient, state)))
 
 
-def choose_joint(path, names):
+def choose_joint(path: Path, names: Sequence[str]) -> str:
     """Return the name of the joint: `elbow`, else the only one."""
     if JOINT in names:
         return JOINT
@@ -208,7 +210,8 @@ def choose_joint(path, names):
         f'{path}: joint_states has the joints {short_list(names)}; one named {JOINT!r} is needed')
 
 
-def bridge_initialises(statuses, namespace):
+def bridge_initialises(statuses: Sequence[tuple[str, Mapping[str, str]]],
+                       namespace: str) -> bool | None:
     """
     Tell whether the bridge heats and cools the muscle, None if no status is its own.
 
@@ -231,7 +234,7 @@ def bridge_initialises(statuses, namespace):
     return mine[0][1] == 'initialising' if mine else None
 
 
-def arm_run(path, recording):
+def arm_run(path: Path, recording: Recording) -> dict[str, np.ndarray]:
     """
     Put the messages on the rows of the joint states.
 
@@ -282,7 +285,8 @@ def arm_run(path, recording):
     return columns
 
 
-def trials(received, stamp, voltage, initialising):
+def trials(received: np.ndarray, stamp: np.ndarray, voltage: np.ndarray,
+           initialising: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """
     Divide the rows at the heat and cool cycles.
 
@@ -308,8 +312,7 @@ def trials(received, stamp, voltage, initialising):
         return np.zeros(len(received), dtype=int), np.zeros(len(received), dtype=bool)
     latest = np.searchsorted(when, received, side='right') - 1
     busy = (latest >= 0) & (flag[np.maximum(latest, 0)] > 0)
-    begins = np.flatnonzero(busy & ~np.concatenate(([False], busy[:-1])))
-    for row in begins:
+    for row in np.flatnonzero(busy & ~np.concatenate(([False], busy[:-1]))):
         # The board heats up at once, the status comes a moment later.
         early = max(int(np.searchsorted(stamp, stamp[row] - HEATING_UP)) - 1, 0)
         changes = np.flatnonzero(np.diff(voltage[early:row + 1]) != 0) + early + 1

@@ -7,6 +7,10 @@ The only module outside the nodes that imports a part of ROS; it is imported whe
 and the package `rosbags` is not installed.
 """
 
+from collections.abc import Collection, Iterator
+
+from pathlib import Path
+
 from hysteresis_ros.measurements.bag_storage import damaged
 import rosbag2_py
 
@@ -14,7 +18,7 @@ import rosbag2_py
 class Rosbag2Storage:
     """A recording read by ROS 2's own reader."""
 
-    def __init__(self, path):
+    def __init__(self, path: Path) -> None:
         self.path = path
         compressed = self.compressed()
         self.reader = (rosbag2_py.SequentialCompressionReader() if compressed
@@ -28,27 +32,27 @@ class Rosbag2Storage:
             # The C++ reader throws RuntimeError, and other types from version to version.
             raise damaged(path, error) from None
 
-    def __enter__(self):
+    def __enter__(self) -> 'Rosbag2Storage':
         return self
 
-    def __exit__(self, *exception):
+    def __exit__(self, *exception: object) -> None:
         self.reader = None
 
-    def files(self):
+    def files(self) -> list[str]:
         """Return the names of the storage files."""
         return [self.path.name] if self.path.is_file() else [p.name for p in self.path.iterdir()]
 
-    def compressed(self):
+    def compressed(self) -> bool:
         """Tell whether the files or messages are compressed by rosbag2 (mcap does it itself)."""
         metadata = self.path / 'metadata.yaml'
         text = metadata.read_text('utf-8') if metadata.is_file() else ''
         return any(n.endswith('.zstd') for n in self.files()) or 'compression_format: zstd' in text
 
-    def storage_id(self):
+    def storage_id(self) -> str:
         """Return the name of the storage plugin."""
         return 'sqlite3' if any('.db3' in name for name in self.files()) else 'mcap'
 
-    def messages(self, topics):
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
         """Yield (topic, received in ns, bytes); as `RosbagsStorage.messages`."""
         self.reader.set_filter(rosbag2_py.StorageFilter(topics=list(topics)))
         try:

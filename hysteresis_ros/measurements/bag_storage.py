@@ -6,14 +6,38 @@ Raw messages of a rosbag2 recording, through `rosbags` or, without it, ROS 2's o
 Both give (topic, receive time, bytes).
 """
 
-from pathlib import Path
+from __future__ import annotations
 
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Protocol, TYPE_CHECKING
+
+from hysteresis_ros.atomic import AnyPath
 from hysteresis_ros.errors import MeasurementError
+
+if TYPE_CHECKING:
+    from rosbags.rosbag2 import Reader
 
 SUFFIXES = ('.mcap', '.db3')
 
 
-def open_bag(path):
+class Storage(Protocol):
+    """A recording that is open: which topics it has, and their messages."""
+
+    topics: dict[str, str]
+
+    def __enter__(self) -> Storage:
+        ...
+
+    def __exit__(self, *exception: object) -> None:
+        ...
+
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, time at which it was received [ns] and bytes of each message."""
+        ...
+
+
+def open_bag(path: AnyPath) -> Storage:
     """
     Open a recording.
 
@@ -48,7 +72,7 @@ def open_bag(path):
     return Rosbag2Storage(path)
 
 
-def storage_of(path):
+def storage_of(path: Path) -> Path:
     """
     Return what to open: the folder, or its only storage file if the metadata is missing.
 
@@ -80,7 +104,7 @@ def storage_of(path):
     return whole
 
 
-def damaged(path, error):
+def damaged(path: Path, error: BaseException) -> MeasurementError:
     """Return the one-line error for a bag that a reader gave up on."""
     text = ' '.join(str(error).split())[:160] or type(error).__name__
     return MeasurementError(
@@ -91,7 +115,7 @@ def damaged(path, error):
 class RosbagsStorage:
     """A recording read by the package rosbags, without the message definitions inside it."""
 
-    def __init__(self, path, reader):
+    def __init__(self, path: Path, reader: type[Reader]) -> None:
         self.path = path
         try:
             self.reader = reader(path)
@@ -101,13 +125,13 @@ class RosbagsStorage:
             raise damaged(path, error) from None
         self.topics = {c.topic: c.msgtype for c in self.reader.connections}
 
-    def __enter__(self):
+    def __enter__(self) -> 'RosbagsStorage':
         return self
 
-    def __exit__(self, *exception):
+    def __exit__(self, *exception: object) -> None:
         self.reader.close()
 
-    def messages(self, topics):
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
         """
         Yield the messages of some topics in the order of the recording.
 

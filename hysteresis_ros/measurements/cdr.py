@@ -12,6 +12,7 @@ encapsulation, then every number aligned to its size.
 
 from collections.abc import Callable
 import struct
+from typing import Any
 
 from hysteresis_ros.errors import MeasurementError
 
@@ -38,14 +39,14 @@ class CdrReader:
 
     """
 
-    def __init__(self, data):
+    def __init__(self, data: bytes) -> None:
         if len(data) < 4 or data[0] != 0 or data[1] > 1:
             raise MeasurementError('a message that is not in plain CDR')
         self.data = data
         self.order = '<' if data[1] == 1 else '>'
         self.position = 4
 
-    def number(self, code, size):
+    def number(self, code: str, size: int) -> Any:
         """Return the next number of a struct code and its size in bytes."""
         position = self.position + (4 - self.position) % size
         try:
@@ -55,18 +56,18 @@ class CdrReader:
         self.position = position + size
         return value
 
-    def float64(self):
+    def float64(self) -> float:
         """Return the next number of 8 bytes."""
         return self.number('d', 8)
 
-    def count(self):
+    def count(self) -> int:
         """Return the length of the next sequence or string."""
         value = self.number('I', 4)
         if value > MOST_ELEMENTS:
             raise MeasurementError('a message with an absurd length')
         return value
 
-    def string(self):
+    def string(self) -> str:
         """Return the next string."""
         length = self.count()
         text = bytes(self.data[self.position:self.position + length])
@@ -75,11 +76,11 @@ class CdrReader:
         self.position += length
         return text.rstrip(b'\0').decode('utf-8', 'replace')
 
-    def strings(self):
+    def strings(self) -> list[str]:
         """Return the next sequence of strings."""
         return [self.string() for _ in range(self.count())]
 
-    def stamp(self):
+    def stamp(self) -> float:
         """Return the stamp of the header that comes next, in s, and skip its frame."""
         seconds, nanoseconds = self.number('i', 4), self.number('I', 4)
         self.string()
@@ -131,7 +132,7 @@ class JointReader:
 
     """
 
-    def __init__(self, choose: Callable[[list[str]], str]):
+    def __init__(self, choose: Callable[[list[str]], str]) -> None:
         self.choose = choose
         self.joint: str | None = None
         self.length = self.place = 0

@@ -2,24 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measurements in CSV files: header, comma, dot, UTF-8."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import csv
 import hashlib
 import io
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 import warnings
 
-from hysteresis_ros.atomic import replacing
+from hysteresis_ros.atomic import AnyPath, replacing
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.quantities import RESPONSES
 from hysteresis_ros.measurements.table import (
     classify, is_known, Measurement, MeasurementWarning, suggestion)
 import numpy as np
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 LONGEST_LINE = 1_000_000
 SETTINGS = ('.yaml', '.yml', '.json')
 
 
-def read_csv(path):
+def read_csv(path: AnyPath) -> Measurement:
     """
     Read a CSV file.
 
@@ -45,14 +52,14 @@ def read_csv(path):
 
     """
     path = Path(path)
-    columns, notes = parse(path, lambda names: classify(names, path))
+    columns, notes = parse(path, lambda names: classify(names, str(path)))
     measurement = Measurement.from_columns(columns, str(path), digest(path), notes)
     for note in measurement.warnings:
         warnings.warn(note, MeasurementWarning, stacklevel=2)
     return measurement
 
 
-def read_reference(path):
+def read_reference(path: AnyPath) -> dict[str, np.ndarray]:
     """
     Read a table of references: `trial, step` and what the muscle is to do.
 
@@ -73,7 +80,7 @@ def read_reference(path):
     """
     path = Path(path)
 
-    def check(names):
+    def check(names: Sequence[str]) -> None:
         if not any(name in names for name in RESPONSES):
             raise MeasurementError(
                 f'{path}: a reference needs force, or force and length, or angle'
@@ -86,7 +93,8 @@ def read_reference(path):
     return columns if 'trial' in columns else {'trial': np.zeros(rows), **columns}
 
 
-def parse(path, check):
+def parse(path: Path,
+          check: Callable[[Sequence[str]], object]) -> tuple[dict[str, np.ndarray], list[str]]:
     """
     Read header and numbers.
 
@@ -120,9 +128,11 @@ def parse(path, check):
         raise MeasurementError(f'{path}: {error.strerror or error}') from None
 
 
-def numbers_of(path, names, first):
+def numbers_of(path: Path, names: list[str],
+               first: int) -> tuple[dict[str, np.ndarray], list[str]]:
     """Read the numbers under a header; as `parse`."""
-    usable, notes = list(names), []
+    usable = list(names)
+    notes: list[str] = []
     if text_in_first_row(path, names, first):
         usable, notes = numeric_columns(path, names, first)
     try:
@@ -138,7 +148,7 @@ def numbers_of(path, names, first):
     return {name: np.ascontiguousarray(values[:, n]) for n, name in enumerate(usable)}, notes
 
 
-def header(path):
+def header(path: Path) -> tuple[list[str], int]:
     """
     Read the names of the columns.
 
@@ -184,25 +194,26 @@ def header(path):
     return cells, first
 
 
-def text_in_first_row(path, names, first):
+def text_in_first_row(path: Path, names: Sequence[str], first: int) -> bool:
     """Tell whether the first row after the header holds text, to save a parse that must fail."""
     for _, cells in rows_of(path, first):
         return any(not is_number(cell) for cell in cells[:len(names)])
     return False
 
 
-def load(path, names, usable, first):
+def load(path: Path, names: Sequence[str], usable: Sequence[str], first: int) -> np.ndarray:
     """Parse the numbers in C, ndarray (rows, usable columns)."""
-    indices = [names.index(name) for name in usable]
+    # NumPy 1.26 takes None and does not say so in its hints.
+    columns: Any = None if len(usable) == len(names) else [names.index(name) for name in usable]
     with warnings.catch_warnings():
         warnings.filterwarnings('ignore', 'loadtxt: input contained no data', UserWarning)
         # An absolute path: NumPy would fetch a relative one that looks like an address.
         return np.loadtxt(str(path.resolve()), delimiter=',', skiprows=first, ndmin=2,
                           encoding='utf-8-sig', comments=None, quotechar='"',
-                          usecols=None if len(indices) == len(names) else indices)
+                          usecols=columns)
 
 
-def numeric_columns(path, names, first):
+def numeric_columns(path: Path, names: Sequence[str], first: int) -> tuple[list[str], list[str]]:
     """
     Find the cells that are no numbers: the slow way, taken only when the fast one failed.
 
@@ -237,7 +248,7 @@ def numeric_columns(path, names, first):
     return [name for name in names if name not in text], notes
 
 
-def check_cell(path, line, name, cell):
+def check_cell(path: Path, line: int, name: str, cell: str) -> None:
     """Refuse a cell of a known column that is empty, text, or no finite number."""
     cell = cell.strip()
     if not cell:
@@ -251,7 +262,7 @@ def check_cell(path, line, name, cell):
     raise MeasurementError(f'{path}: line {line}, column {name!r} {what}; mend or remove the line')
 
 
-def rows_of(path, first):
+def rows_of(path: Path, first: int) -> Iterator[tuple[int, list[str]]]:
     """Yield (line, cells) of the rows after the header that are not blank."""
     with open(path, encoding='utf-8-sig', newline='') as file:
         for _ in range(first):
@@ -266,7 +277,7 @@ def rows_of(path, first):
                 f'{path}: line {first + reader.line_num}: {error}') from None
 
 
-def is_number(cell):
+def is_number(cell: str) -> bool:
     """Tell whether a cell is a number in the way that NumPy reads it."""
     try:
         float(cell)
@@ -275,7 +286,7 @@ def is_number(cell):
     return '_' not in cell
 
 
-def digest(path):
+def digest(path: AnyPath) -> str:
     """Return the SHA-256 of a file, or of the files of a folder in the order of their names."""
     path = Path(path)
     found = hashlib.sha256()
@@ -287,7 +298,7 @@ def digest(path):
     return found.hexdigest()
 
 
-def write_csv(measurement, path):
+def write_csv(measurement: Measurement | Mapping[str, ArrayLike], path: AnyPath) -> None:
     """
     Write a table.
 

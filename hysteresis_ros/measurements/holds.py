@@ -2,13 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settled states of continuous runs: the ends of the stretches in which the drive is held."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.measurements.table import SETTLED_HOLD
 import numpy as np
 
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
 
-def settled_rows(measurement, hold=SETTLED_HOLD, average=1.0):
+
+def settled_rows(measurement: Measurement, hold: float = SETTLED_HOLD,
+                 average: float = 1.0) -> Measurement | None:
     """
     Take the settled state at the end of every hold of a continuous run.
 
@@ -39,7 +46,8 @@ def settled_rows(measurement, hold=SETTLED_HOLD, average=1.0):
         for name, values in measurement.columns.items()})
 
 
-def hold_ends(measurement, hold=SETTLED_HOLD, average=1.0):
+def hold_ends(measurement: Measurement, hold: float = SETTLED_HOLD,
+              average: float = 1.0) -> np.ndarray | None:
     """
     Find the rows at the end of every hold.
 
@@ -57,7 +65,7 @@ def hold_ends(measurement, hold=SETTLED_HOLD, average=1.0):
         begins or ends its trial, or if there is none.
 
     """
-    time = measurement.time
+    time = measurement.column('time')
     found = []
     for _, rows in measurement.split():
         for low, high in holds(measurement.column(measurement.drive), rows):
@@ -70,7 +78,7 @@ def hold_ends(measurement, hold=SETTLED_HOLD, average=1.0):
     return np.array(found) if found else None
 
 
-def mean_of_windows(values, windows):
+def mean_of_windows(values: np.ndarray, windows: np.ndarray) -> np.ndarray:
     """
     Average a column over windows of rows.
 
@@ -88,7 +96,7 @@ def mean_of_windows(values, windows):
     return np.array([values[low:high].mean() for low, high in windows])
 
 
-def holds(drive, rows, tolerance=1e-3):
+def holds(drive: np.ndarray, rows: slice, tolerance: float = 1e-3) -> list[tuple[int, int]]:
     """
     Divide a trial into stretches in which the drive stays where it was when each began.
 

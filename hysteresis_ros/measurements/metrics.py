@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far a prediction is off (Eqs. 23 and 24), and how near it can come at all."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from hysteresis_ros.measurements import settled_rows
+from hysteresis_ros.measurements import Measurement, settled_rows
 import numpy as np
 
 FEWEST_REPEATED_ROWS = 5
@@ -34,12 +35,12 @@ class Errors(NamedTuple):
     mean_percent: float
     std_percent: float
 
-    def to_json(self):
+    def to_dict(self) -> dict[str, float | None]:
         """Return the numbers by name; those that are not finite become None."""
         return {name: finite(value) for name, value in self._asdict().items()}
 
 
-def errors(residual, output_range):
+def errors(residual: np.ndarray, output_range: float) -> Errors:
     """
     Return the errors of Eqs. 23 and 24 and the RMSE.
 
@@ -62,7 +63,7 @@ def errors(residual, output_range):
     return Errors(mean_abs, std, rmse, mean_abs * percent, std * percent)
 
 
-def finite(value):
+def finite(value: float) -> float | None:
     """Return a float that JSON can hold, or None."""
     return float(value) if np.isfinite(value) else None
 
@@ -85,7 +86,7 @@ class Floor(NamedTuple):
     origin: str
 
 
-def noise_floor(measurements):
+def noise_floor(measurements: Sequence[Measurement]) -> Floor:
     """
     Estimate the noise of the response from the recordings alone.
 
@@ -109,7 +110,7 @@ def noise_floor(measurements):
     return max(found, key=lambda floor: floor.value)
 
 
-def resolution_noise(measurement):
+def resolution_noise(measurement: Measurement) -> float:
     """
     Return the standard deviation of rounding to the sensor's steps: step / sqrt(12).
 
@@ -129,7 +130,7 @@ def resolution_noise(measurement):
     return float(steps.min() / np.sqrt(12.0)) if steps.size else 0.0
 
 
-def sample_noise(measurement):
+def sample_noise(measurement: Measurement) -> float:
     """
     Return the standard deviation of what is new in every sample of a continuous run.
 
@@ -146,14 +147,13 @@ def sample_noise(measurement):
 
     """
     values = measurement.column(measurement.response)
-    seconds = [np.diff(values[rows], 2) for _, rows in measurement.split()]
-    seconds = np.concatenate(seconds)
+    seconds = np.concatenate([np.diff(values[rows], 2) for _, rows in measurement.split()])
     if seconds.size < 10:
         return 0.0
     return float(1.4826 * np.median(np.abs(seconds)) / np.sqrt(6.0))
 
 
-def repeat_noise(measurements):
+def repeat_noise(measurements: Sequence[Measurement]) -> float | None:
     """
     Return the standard deviation between trials with the same inputs.
 
@@ -167,7 +167,7 @@ def repeat_noise(measurements):
         None if no settled trial was repeated.
 
     """
-    groups = {}
+    groups: dict[tuple, list[np.ndarray]] = {}
     for measurement in measurements:
         settled = settled_rows(measurement)
         if settled is None:

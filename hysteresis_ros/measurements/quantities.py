@@ -54,7 +54,7 @@ QUANTITIES = {
 }
 
 
-def unit_of(name):
+def unit_of(name: str) -> str:
     """
     Return a column's unit in files, '' if it is not known.
 
@@ -66,7 +66,7 @@ def unit_of(name):
     return quantity.unit if quantity else ''
 
 
-def shown(name):
+def shown(name: str) -> tuple[str, float]:
     """
     Return the unit for people and the factor to it.
 

@@ -2,12 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The one table type that every measurement becomes, and the checks that it passes."""
 
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import difflib
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.quantities import DRIVES, LOADS, QUANTITIES, RESPONSES
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 SETTLED_HOLD = 20.0
 """Rows of a run that are at least this many seconds apart are settled states."""
@@ -55,7 +62,8 @@ class Measurement:
     warnings: tuple = ()
 
     @classmethod
-    def from_columns(cls, columns, source='memory', digest='', warnings=()):
+    def from_columns(cls, columns: Mapping[str, ArrayLike], source: str = 'memory',
+                     digest: str = '', warnings: Iterable[str] = ()) -> 'Measurement':
         """
         Build a measurement from columns; their names say what it is.
 
@@ -76,53 +84,53 @@ class Measurement:
             If columns are missing, misnamed, of different lengths, empty, or not finite.
 
         """
-        columns = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
-        kind, response, drive, load = classify(columns, source)
-        rows = len(columns[response])
-        for name, values in columns.items():
+        arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+        kind, response, drive, load = classify(arrays, source)
+        rows = len(arrays[response])
+        for name, values in arrays.items():
             if values.shape != (rows,):
                 raise MeasurementError(
                     f'{source}: column {name!r} has shape {values.shape}, {response!r} has '
                     f'{rows} rows; every column needs one number a row')
         if rows == 0:
             raise MeasurementError(f'{source}: the table has no rows')
-        columns.setdefault('trial', np.zeros(rows))
-        for name, values in columns.items():
+        arrays.setdefault('trial', np.zeros(rows))
+        for name, values in arrays.items():
             if is_known(name) and not np.all(np.isfinite(values)):
                 row = int(np.flatnonzero(~np.isfinite(values))[0])
                 raise MeasurementError(
                     f'{source}: row {row}, column {name!r} is {values[row]}; remove the row or '
                     'mend the value')
-        measurement = cls(kind, response, drive, load, columns, str(source), digest)
+        measurement = cls(kind, response, drive, load, arrays, str(source), digest)
         check_order(measurement)
         return replace(measurement, warnings=(
             tuple(warnings) + name_warnings(measurement) + unit_warnings(measurement)))
 
     @property
-    def rows(self):
+    def rows(self) -> int:
         """Number of rows."""
         return len(self.columns[self.response])
 
     @property
-    def trials(self):
+    def trials(self) -> np.ndarray:
         """Identifiers of the trials in the order of the file, ndarray of float64."""
         values = self.columns['trial']
         return values[np.concatenate(([True], values[1:] != values[:-1]))]
 
     @property
-    def time(self):
+    def time(self) -> np.ndarray | None:
         """Time in s from the start of the trial, (rows,), or None for a table without it."""
         return self.columns.get('time')
 
     @property
-    def settled(self):
+    def settled(self) -> bool:
         """Whether each row is a settled state: no time, or rows at least 20 s apart."""
         if self.time is None:
             return True
         steps = np.diff(self.time)[np.diff(self.columns['trial']) == 0]
         return bool(steps.size == 0 or steps.min() >= SETTLED_HOLD * (1 - 1e-6))
 
-    def column(self, name):
+    def column(self, name: str) -> np.ndarray:
         """
         Return one column.
 
@@ -145,7 +153,7 @@ class Measurement:
                 f'{self.source}: no column {name!r}{suggestion(name, self.columns)}')
         return self.columns[name]
 
-    def split(self):
+    def split(self) -> list[tuple[float, slice]]:
         """
         Return the trials as (identifier, slice of the rows), in the order of the file.
 
@@ -159,7 +167,7 @@ class Measurement:
         return [(float(values[low]), slice(int(low), int(high)))
                 for low, high in zip(starts[:-1], starts[1:])]
 
-    def select(self, trials):
+    def select(self, trials: Iterable[float]) -> 'Measurement':
         """
         Return the rows of some trials.
 
@@ -185,7 +193,7 @@ class Measurement:
                 f'{trial_list(self.trials)}')
         return self.where(np.isin(self.columns['trial'], wanted))
 
-    def where(self, rows):
+    def where(self, rows: np.ndarray | slice) -> 'Measurement':
         """
         Return some rows.
 
@@ -201,7 +209,7 @@ class Measurement:
         return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
 
 
-def classify(columns, source):
+def classify(columns: Collection[str], source: str) -> tuple[str, str, str, str | None]:
     """
     Tell what a table is from the names of its columns.
 
@@ -222,16 +230,8 @@ def classify(columns, source):
         If there is no response or no drive among the names.
 
     """
-    drive = next((name for name in DRIVES if name in columns), None)
-    response = next((name for name in RESPONSES if name in columns), None)
-    for found, names, role in ((drive, DRIVES, 'drive'), (response, RESPONSES, 'response')):
-        if found is None:
-            strange = [name for name in columns if not is_known(name)]
-            close = [(name, closest(name, strange)) for name in names if closest(name, strange)]
-            hint = (f'is {close[0][1]!r} meant to be {close[0][0]!r}? Rename it' if close
-                    else f'the columns are {short_list(columns)}')
-            raise MeasurementError(
-                f'{source}: no column with the {role} ({", ".join(names)}); {hint}')
+    drive = first_of(DRIVES, columns, 'drive', source)
+    response = first_of(RESPONSES, columns, 'response', source)
     if response == 'angle':
         if 'time' not in columns and 'step' not in columns:
             raise MeasurementError(
@@ -244,7 +244,19 @@ def classify(columns, source):
     return 'bench', response, drive, load
 
 
-def check_order(measurement):
+def first_of(names: Sequence[str], columns: Collection[str], role: str, source: str) -> str:
+    """Return the first of some names that is a column; MeasurementError if there is none."""
+    for name in names:
+        if name in columns:
+            return name
+    unknown = [name for name in columns if not is_known(name)]
+    close = [(name, closest(name, unknown)) for name in names if closest(name, unknown)]
+    hint = (f'is {close[0][1]!r} meant to be {close[0][0]!r}? Rename it' if close
+            else f'the columns are {short_list(columns)}')
+    raise MeasurementError(f'{source}: no column with the {role} ({", ".join(names)}); {hint}')
+
+
+def check_order(measurement: Measurement) -> None:
     """
     Refuse rows whose order contradicts their trials, times or steps.
 
@@ -278,7 +290,7 @@ def check_order(measurement):
             'give every heat-and-cool cycle a trial of its own, and remove rows written twice')
 
 
-def name_warnings(measurement):
+def name_warnings(measurement: Measurement) -> tuple[str, ...]:
     """
     Return unknown columns whose names are almost known ones, one line each.
 
@@ -302,7 +314,7 @@ def name_warnings(measurement):
     return tuple(found)
 
 
-def unit_warnings(measurement):
+def unit_warnings(measurement: Measurement) -> tuple[str, ...]:
     """
     Return what looks wrong by a factor of 1000, one line each.
 
@@ -339,19 +351,19 @@ def unit_warnings(measurement):
     return tuple(found)
 
 
-def is_known(name):
+def is_known(name: str) -> bool:
     """Tell whether a column's meaning is fixed by the file format."""
     return name in QUANTITIES or name in ('trial', 'step')
 
 
-def closest(name, columns, similarity=0.6):
+def closest(name: str, columns: Iterable[str], similarity: float = 0.6) -> str | None:
     """Return the column whose name is most like this one, or None."""
     lowered = {str(column).lower(): column for column in columns}
     matches = difflib.get_close_matches(name.lower(), lowered, 1, similarity)
     return lowered[matches[0]] if matches else None
 
 
-def suggestion(name, columns):
+def suggestion(name: str, columns: Iterable[str]) -> str:
     """Return the end of a message: the column that was probably meant, or what there is."""
     close = closest(name, columns)
     if close:
@@ -359,12 +371,12 @@ def suggestion(name, columns):
     return f'; the columns are {short_list(columns)}'
 
 
-def short_list(names, most=12):
+def short_list(names: Iterable[str], most: int = 12) -> str:
     """Return names for a message, in quotes, cut off after some."""
     names = [repr(str(name)[:40]) for name in names]
     return ', '.join(names[:most]) + (', ...' if len(names) > most else '')
 
 
-def trial_list(trials):
+def trial_list(trials: Iterable[float]) -> str:
     """Return identifiers of trials for a message."""
     return ', '.join(f'{trial:g}' for trial in list(trials)[:20])

@@ -13,8 +13,12 @@ for ``telemetry_timeout``, and first of all when the node ends. A setpoint that 
 of the limits never reaches the board and does not renew the one before.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 import threading
 import time
+from typing import Any, TYPE_CHECKING
 
 from builtin_interfaces.msg import Time
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -37,6 +41,10 @@ from hysteresis_ros.nodes.parameters import Parameters
 from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
 from hysteresis_ros.nodes.running import run
 
+if TYPE_CHECKING:
+    from hysteresis_ros.bridge.board_state import Sample, Status
+    from hysteresis_ros.bridge.heat_and_cool import HeatAndCool
+
 LOOK_PERIOD = 0.05          # s of the wall between two looks at the board's status
 ENABLE_PATIENCE = 3.0       # s of the wall that ~/enable waits for the board to follow
 BAD_LINES_SHOWN_FOR = 5.0   # s of the wall after the latest bad line
@@ -54,7 +62,7 @@ class BridgeNode(Node):
 
     PARAMETERS = PARAMETERS
 
-    def __init__(self, **options):
+    def __init__(self, **options: Any) -> None:
         super().__init__('hardware_bridge', **options)
         self._settings = parameters = Parameters(
             self, self.PARAMETERS, check=check, changed=self._configure)
@@ -66,19 +74,21 @@ class BridgeNode(Node):
             1.0 / parameters['telemetry_rate'], parameters['supply_voltage'],
             parameters['supply_tolerance'], self._on_sample)
         self._lock = threading.Lock()   # of what callbacks and the reading thread share:
-        self._cycle = None              # the heat and cool cycle that is running
-        self._outcome = None            # its end: (success, message)
+        # The heat and cool cycle that is running, and its end: (success, message).
+        self._cycle: HeatAndCool | None = None
+        self._outcome: tuple[bool, str] | None = None
         self._progress = ''
-        self._stamps = None
+        self._stamps: RealStamps | SimulatedStamps | None = None
         self._wall = Clock(clock_type=ClockType.STEADY_TIME)
-        self._waiting = []              # (is it so?, future, wall time until which to wait)
+        # (is it so?, future, wall time until which to wait)
+        self._waiting: list[tuple[Callable[[Status], bool], Any, float]] = []
         self._wanted = parameters['start_enabled']
         self._taken = self._refused = 0
         self._bad_lines = (0, -BAD_LINES_SHOWN_FOR)
         self._joints = self.create_publisher(JointState, 'joint_states', MEASUREMENTS)
         self._voltages = self.create_publisher(Float64, 'applied_voltage', MEASUREMENTS)
         self._ambients = self.create_publisher(Temperature, 'ambient_temperature', MEASUREMENTS)
-        self._clocks = None
+        self._clocks: Any = None
         self._diagnostics = Diagnostics(
             self, parameters['hardware_id'], self._values, 'board and arm are fine')
         self.create_subscription(Float64, 'voltage_setpoint', self._on_setpoint, COMMANDS)
@@ -90,21 +100,21 @@ class BridgeNode(Node):
         self._board.enable(self._wanted)
         self._board.start()
 
-    def on_shutdown(self):
+    def on_shutdown(self) -> None:
         """Write zero to the board, before anything else ends."""
         self._board.stop()
 
-    def destroy_node(self):
+    def destroy_node(self) -> None:
         """Stop the board, whose thread publishes, before the publishers go."""
         self._board.stop()
         super().destroy_node()
 
-    def _configure(self, parameters):
+    def _configure(self, parameters: Parameters) -> None:
         self._board.pwm = make_pwm(parameters)
 
     # Setpoints and services
 
-    def _on_setpoint(self, message):
+    def _on_setpoint(self, message: Float64) -> None:
         try:
             with self._lock:
                 if self._cycle is not None:
@@ -118,7 +128,8 @@ class BridgeNode(Node):
         self._taken += 1
         self._diagnostics.clear('setpoint')
 
-    async def _on_enable(self, request, response):
+    async def _on_enable(self, request: SetBool.Request,
+                         response: SetBool.Response) -> SetBool.Response:
         wanted = request.data
         status = self._board.status
         if wanted and not status.online:
@@ -133,15 +144,16 @@ class BridgeNode(Node):
             response.message = 'disabled; the board is not there, and will stay off'
             return response
         response.success = await self._until(
-            lambda status: status.online and status.sample.enabled == wanted, ENABLE_PATIENCE)
+            lambda status: enabled(status) == wanted, ENABLE_PATIENCE)
         response.message = 'enabled' if wanted else 'disabled'
         if not response.success:
             response.message = f'the board did not follow: {self._board.status.problem}'
         return response
 
-    async def _on_initialise(self, request, response):
+    async def _on_initialise(self, request: Trigger.Request,
+                             response: Trigger.Response) -> Trigger.Response:
         status = self._board.status
-        if not (status.online and status.sample.enabled):
+        if not enabled(status):
             response.message = f'not begun: {status.problem or "the output is not enabled"}'
             return response
         with self._lock:
@@ -152,12 +164,14 @@ class BridgeNode(Node):
             self._progress = 'begun'
             self._cycle = make_cycle(self._settings)
         await self._until(lambda status: self._outcome is not None)
-        response.success, response.message = self._outcome
+        if self._outcome is not None:
+            response.success, response.message = self._outcome
         self._diagnostics.clear('setpoint')
         self.get_logger().info(f'~/initialise: {response.message}')
         return response
 
-    async def _until(self, condition, patience=float('inf')):
+    async def _until(self, condition: Callable[[Status], bool],
+                     patience: float = float('inf')) -> bool:
         """Let other callbacks run until the board's status is as wanted; False if it is not."""
         future = Future()
         self._waiting.append((condition, future, time.monotonic() + patience))
@@ -165,7 +179,7 @@ class BridgeNode(Node):
 
     # What the board says, in its reading thread
 
-    def _on_sample(self, sample):
+    def _on_sample(self, sample: Sample) -> None:
         if not self.context.ok():
             return
         stamp = self._stamp(sample)
@@ -181,9 +195,9 @@ class BridgeNode(Node):
             self._ambients.publish(message)
         with self._lock:
             if self._cycle is not None:
-                self._heat_and_cool(sample)
+                self._heat_and_cool(self._cycle, sample)
 
-    def _stamp(self, sample):
+    def _stamp(self, sample: Sample) -> Time:
         speed = self._board.speed
         now = 1e-9 * self.get_clock().now().nanoseconds
         if speed == 1.0:
@@ -198,11 +212,11 @@ class BridgeNode(Node):
                 self._clocks.publish(ClockMessage(clock=stamp))
         return stamp
 
-    def _heat_and_cool(self, sample):
+    def _heat_and_cool(self, cycle: HeatAndCool, sample: Sample) -> None:
         try:
             if not sample.enabled:
                 raise BoardError('heat and cool cycle: the output was switched off meanwhile')
-            phase = self._cycle.update(sample.time, sample.angle, sample.voltage)
+            phase = cycle.update(sample.time, sample.angle, sample.voltage)
         except BoardError as error:
             self._end_cycle(False, str(error))
             return
@@ -214,14 +228,14 @@ class BridgeNode(Node):
         else:
             self._board.set_zero()
 
-    def _end_cycle(self, success, message):
+    def _end_cycle(self, success: bool, message: str) -> None:
         self._board.set_zero()
         self._cycle = None
         self._outcome = success, message
 
     # The board's status, in the executor
 
-    def _look(self):
+    def _look(self) -> None:
         if not self.context.ok():
             return
         status = self._board.status
@@ -241,17 +255,17 @@ class BridgeNode(Node):
             else:
                 self._waiting.append((condition, future, deadline))
 
-    def _keep_clock(self, status):
+    def _keep_clock(self, status: Status) -> None:
         if status.identity is None or status.identity.speed == 1.0:
             return
         if self._clocks is None:
             self._clocks = self.create_publisher(ClockMessage, '/clock', 10)
         with self._lock:
-            if not status.online and self._stamps is not None:
+            if not status.online and isinstance(self._stamps, SimulatedStamps):
                 self._clocks.publish(
                     ClockMessage(clock=_message(self._stamps.idle(time.monotonic()))))
 
-    def _judge(self, status):
+    def _judge(self, status: Status) -> None:
         sample = status.sample
         if not status.online and not status.problem:
             self._diagnostics.set('board', OK, f'looking for the board at '
@@ -270,7 +284,7 @@ class BridgeNode(Node):
                    'refused' if self._cycle is not None else '')
         self._judge_lines(status)
 
-    def _judge_lines(self, status):
+    def _judge_lines(self, status: Status) -> None:
         now = time.monotonic()
         count, since = self._bad_lines
         if status.bad_lines > count:
@@ -281,13 +295,13 @@ class BridgeNode(Node):
         elif now - since > BAD_LINES_SHOWN_FOR:
             self._diagnostics.clear('lines')
 
-    def _tell(self, name, level, sentence):
+    def _tell(self, name: str, level: bytes, sentence: str) -> None:
         if sentence:
             self._diagnostics.set(name, level, sentence)
         else:
             self._diagnostics.clear(name)
 
-    def _values(self):
+    def _values(self) -> dict[str, Any]:
         status = self._board.status
         values = {
             'state': 'initialising' if self._cycle is not None else 'ready',
@@ -306,11 +320,16 @@ class BridgeNode(Node):
         return values
 
 
-def _message(seconds):
+def enabled(status: Status) -> bool | None:
+    """Return whether the board says that its output is enabled; None while it is not there."""
+    return status.sample.enabled if status.online and status.sample is not None else None
+
+
+def _message(seconds: float) -> Time:
     whole = int(seconds)
     return Time(sec=whole, nanosec=min(int(1e9 * (seconds - whole)), 999_999_999))
 
 
-def main(args=None) -> int:
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
     return run(BridgeNode, args)

@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of the node `hardware_bridge`, and what is made of them."""
 
+from collections.abc import Mapping
+
+from typing import Any
+
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.heat_and_cool import HeatAndCool
 from hysteresis_ros.bridge.pwm import Pwm
@@ -58,13 +62,13 @@ INITIALISATION = (
 PARAMETERS = BOARD + OUTPUT + ENCODER + INITIALISATION + VOLTAGE_LIMITS + NAMES
 
 
-def make_pwm(values):
+def make_pwm(values: Mapping[str, Any]) -> Pwm:
     """Return the law and limits between voltage and duty."""
     return Pwm(values['pwm_law'], values['minimum_voltage'], values['maximum_voltage'],
                values['maximum_duty'])
 
 
-def make_encoder(values):
+def make_encoder(values: Mapping[str, Any]) -> Encoder:
     """Return what turns counts into an angle."""
     return Encoder(
         values['counts_per_revolution'], values['encoder_direction'], values['encoder_zero'],
@@ -72,13 +76,13 @@ def make_encoder(values):
         index=values['encoder_index'], index_angle=values['encoder_index_angle'])
 
 
-def make_cycle(values):
+def make_cycle(values: Mapping[str, Any]) -> HeatAndCool:
     """Return a heat and cool cycle."""
     return HeatAndCool(min(values['initialise_voltage'], values['maximum_voltage']),
                        values['initialise_heat_time'], values['initialise_cool_time'])
 
 
-def check(values):
+def check(values: Mapping[str, Any]) -> None:
     """Refuse values that make no sense, alone or together, with a `ParameterError`."""
     make_pwm(values)
     make_encoder(values)

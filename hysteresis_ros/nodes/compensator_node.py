@@ -13,7 +13,11 @@ When the diagnostics say that the bridge of the same arm has begun to heat and c
 nothing warms the muscle again between the cycle's end and the next reference.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 import math
+from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
@@ -32,6 +36,9 @@ from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
 from hysteresis_ros.nodes.reference import (
     ArmReference, load_model, needs_ambient, read_angle, read_reference, seconds)
 from hysteresis_ros.nodes.running import run
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import MuscleModel
 
 COMPENSATION = (
     Spec('republish_period', 0.5, 'Time after which the last setpoint is repeated; 0 for never',
@@ -68,7 +75,7 @@ class CompensatorNode(Node):
 
     PARAMETERS = MODEL + VOLTAGE_LIMITS + COMPENSATION + GEOMETRY + NAMES
 
-    def __init__(self, model=None, **options):
+    def __init__(self, model: MuscleModel | None = None, **options: Any) -> None:
         super().__init__('hysteresis_compensator', **options)
         parameters = Parameters(
             self, self.PARAMETERS, check=_check, changed=self._configure)
@@ -101,7 +108,7 @@ class CompensatorNode(Node):
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self.create_service(Trigger, '~/reset', self._on_reset)
 
-    def _configure(self, parameters):
+    def _configure(self, parameters: Parameters) -> None:
         self._muscle, self._joint = parameters['muscle_name'], parameters['joint_name']
         self._feedback = parameters['feedback']
         self._geometry = BicepGeometry.from_mapping(parameters)
@@ -119,16 +126,16 @@ class CompensatorNode(Node):
         if repeated:
             self._timer = self.create_timer(0.5 * parameters['republish_period'], self._repeat)
 
-    def _forget(self):
-        self._wanted = None
+    def _forget(self) -> None:
+        self._wanted: Reference | None = None
         self._target = math.nan
         self._saturated = 0
         self._integral.reset()
 
-    def _now(self):
+    def _now(self) -> float:
         return 1e-9 * self.get_clock().now().nanoseconds
 
-    def _on_reference(self, message):
+    def _on_reference(self, message: JointState) -> None:
         self._received += 1
         try:
             wanted = read_reference(message, self._muscle)
@@ -143,7 +150,7 @@ class CompensatorNode(Node):
             self._integral.begin(self._now())
         self._published += self._apply(self._corrected(wanted))
 
-    def _corrected(self, wanted):
+    def _corrected(self, wanted: Reference) -> Reference:
         """Return the reference with the feedback's correction of the angle."""
         correction = self._integral.correction
         if correction == 0.0:
@@ -155,7 +162,7 @@ class CompensatorNode(Node):
         force = self._geometry.force(after) - self._geometry.force(before)
         return Reference(float(self._geometry.length(after)), float(wanted.force + force))
 
-    def _apply(self, reference):
+    def _apply(self, reference: Reference) -> bool:
         """Publish the voltage for a reference and return whether there was one."""
         try:
             setpoint = self._controller.setpoint(
@@ -178,11 +185,11 @@ class CompensatorNode(Node):
             self._diagnostics.clear('saturated')
         return True
 
-    def _publish(self, voltage):
+    def _publish(self, voltage: float) -> None:
         self._publisher.publish(Float64(data=voltage))
         self._silent = False
 
-    def _repeat(self):
+    def _repeat(self) -> None:
         """Publish when there was silence since the last look, half a period ago."""
         if self._silent and self._wanted is not None:
             self._publish(self._controller.hold(self._now()))
@@ -190,7 +197,7 @@ class CompensatorNode(Node):
         else:
             self._silent = True
 
-    def _on_joint_states(self, message):
+    def _on_joint_states(self, message: JointState) -> None:
         angle = read_angle(message, self._joint)
         if self._wanted is None or angle is None:
             return
@@ -200,10 +207,10 @@ class CompensatorNode(Node):
         if correction != before:
             self._corrections += self._apply(self._corrected(self._wanted))
 
-    def _on_ambient(self, message):
+    def _on_ambient(self, message: Temperature) -> None:
         self._ambient = message.temperature
 
-    def _on_diagnostics(self, message):
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         """Forget when the bridge of the same arm begins its heat and cool cycle."""
         for status in message.status:
             if status.name != self._bridge:
@@ -214,19 +221,19 @@ class CompensatorNode(Node):
                 self.get_logger().info('the bridge heats and cools the muscle: memory wiped')
             self._initialising = state == 'initialising'
 
-    def _reset(self):
+    def _reset(self) -> None:
         self._controller.reset()
         self._forget()
         self._diagnostics.clear('saturated')
 
-    def _on_reset(self, request, response):
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._reset()
         response.success = True
         response.message = 'memory wiped; the setpoint is repeated again from the next reference'
         self.get_logger().info(response.message)
         return response
 
-    def _counts(self):
+    def _counts(self) -> dict[str, Any]:
         return {'references received': self._received, 'setpoints published': self._published,
                 'references refused': self._refused, 'setpoints repeated': self._repeated,
                 'feedback corrections': self._corrections,
@@ -234,7 +241,7 @@ class CompensatorNode(Node):
                 'kernels ready after [s]': self._ready_after}
 
 
-def _check(values):
+def _check(values: Mapping[str, Any]) -> None:
     check_limits(values, 'voltage')
     BicepGeometry.from_mapping(values)
     horizon, period = values['horizon'], values['republish_period']
@@ -243,6 +250,6 @@ def _check(values):
                              f'{horizon:g} s; a muscle would be overdriven for too long')
 
 
-def main(args=None) -> int:
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
     return run(CompensatorNode, args)

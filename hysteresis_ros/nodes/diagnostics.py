@@ -8,11 +8,17 @@ shows the worst level and every sentence that holds. The log gets each condition
 goes, and at most every few seconds while it lasts, however often it is raised.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
+from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -36,13 +42,14 @@ class Diagnostics:
         The sentence when no condition holds.
     """
 
-    def __init__(self, node, hardware_id: str, values: Callable[[], Mapping], fine: str = 'fine'):
+    def __init__(self, node: Node, hardware_id: str, values: Callable[[], Mapping],
+                 fine: str = 'fine') -> None:
         self._node = node
         self._hardware_id = hardware_id
         self._values = values
         self._fine = fine
-        self._conditions = {}
-        self._logged = {}
+        self._conditions: dict[str, tuple[bytes, str]] = {}
+        self._logged: dict[str, Any] = {}   # when, by rclpy's clock
         # Seconds of the wall: a clock that stands still is worth a diagnosis, too.
         self._clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -78,7 +85,7 @@ class Diagnostics:
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
 
-    def _log(self, name, level, sentence, changed):
+    def _log(self, name: str, level: bytes, sentence: str, changed: bool) -> None:
         now = self._clock.now()
         if not changed and now - self._logged[name] < LOG_AGAIN_AFTER:
             return
@@ -93,5 +100,5 @@ class Diagnostics:
             logger.info(sentence)
 
 
-def _text(value):
+def _text(value: object) -> str:
     return f'{value:.6g}' if isinstance(value, float) else str(value)

@@ -35,7 +35,7 @@ class AngleFeedback:
     """
 
     def __init__(self, gain: float = 0.0, limit: float = 0.0, rest_speed: float = 0.0,
-                 dead_band: float = 0.0, period: float = 0.0, delay: float = 0.0):
+                 dead_band: float = 0.0, period: float = 0.0, delay: float = 0.0) -> None:
         self.configure(gain, limit, rest_speed, dead_band, period, delay)
         self.reset()
 
@@ -57,8 +57,8 @@ class AngleFeedback:
     def begin(self, time: float) -> None:
         """Take note of a new target at the time [s]; the correction stays."""
         self._begun = time
-        self._time = None
-        self._angle = None
+        self._time: float | None = None
+        self._angle = math.nan
 
     def update(self, time: float, angle: float, target: float, saturated: int = 0) -> float:
         """

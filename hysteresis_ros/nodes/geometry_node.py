@@ -9,8 +9,12 @@ log and diagnostics say why. With a model file, the effects of the arm and of it
 model knows are undone here, the muscle's own in `compensator_node`.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 import dataclasses
 import math
+from typing import Any, TYPE_CHECKING
 
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -24,6 +28,9 @@ from hysteresis_ros.nodes.parameters import (
 from hysteresis_ros.nodes.qos import COMMANDS
 from hysteresis_ros.nodes.reference import ArmReference, load_model
 from hysteresis_ros.nodes.running import run
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import MuscleModel
 
 
 class GeometryNode(Node):
@@ -40,7 +47,7 @@ class GeometryNode(Node):
 
     PARAMETERS = GEOMETRY + ANGLE_LIMITS + MODEL + NAMES
 
-    def __init__(self, model=None, **options):
+    def __init__(self, model: MuscleModel | None = None, **options: Any) -> None:
         super().__init__('bicep_geometry', **options)
         parameters = Parameters(
             self, self.PARAMETERS, check=_check, changed=self._configure)
@@ -54,7 +61,7 @@ class GeometryNode(Node):
         self._publisher = self.create_publisher(JointState, 'muscle_reference', COMMANDS)
         self.create_subscription(Float64, 'target_angle', self._on_target, COMMANDS)
 
-    def _configure(self, parameters):
+    def _configure(self, parameters: Parameters) -> None:
         self._limits = parameters['minimum_angle'], parameters['maximum_angle']
         self._muscle = parameters['muscle_name']
         geometry = BicepGeometry.from_mapping(parameters)
@@ -62,7 +69,7 @@ class GeometryNode(Node):
             self._model = dataclasses.replace(self._model, geometry=geometry)
         self._reference = ArmReference(geometry, self._model).reference
 
-    def _on_target(self, message):
+    def _on_target(self, message: Float64) -> None:
         self._received += 1
         try:
             self._check_target(message.data)
@@ -78,23 +85,23 @@ class GeometryNode(Node):
         self._published += 1
         self._diagnostics.clear('target')
 
-    def _check_target(self, angle):
+    def _check_target(self, angle: float) -> None:
         low, high = self._limits
         if math.isfinite(angle) and not low <= angle <= high:
             raise RangeError(
                 f'target angle {angle:.4f} rad is outside the limits of {low:.4f} to '
                 f'{high:.4f} rad ({math.degrees(low):.1f} to {math.degrees(high):.1f} deg)')
 
-    def _counts(self):
+    def _counts(self) -> dict[str, Any]:
         return {'targets received': self._received, 'references published': self._published,
                 'targets refused': self._refused}
 
 
-def _check(values):
+def _check(values: Mapping[str, Any]) -> None:
     check_limits(values, 'angle')
     BicepGeometry.from_mapping(values)
 
 
-def main(args=None) -> int:
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
     return run(GeometryNode, args)

@@ -12,8 +12,12 @@ When the bridge's ``~/initialise`` has heated and cooled the muscle, call this n
 a model of the whole voltage range has its memory wiped by the cycle itself, as the muscle has.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 import dataclasses
 import math
+from typing import Any, TYPE_CHECKING
 
 from rclpy.node import Node
 from sensor_msgs.msg import JointState, Temperature
@@ -27,6 +31,9 @@ from hysteresis_ros.nodes.parameters import GEOMETRY, MODEL, NAMES, Parameters, 
 from hysteresis_ros.nodes.qos import MEASUREMENTS
 from hysteresis_ros.nodes.reference import load_model, needs_ambient, read_angle, seconds
 from hysteresis_ros.nodes.running import run
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import MuscleModel
 
 MONITORING = (
     Spec('residual_limit', 0.1, 'Difference between measurement and model that is reported as a '
@@ -52,7 +59,7 @@ class MonitorNode(Node):
     PARAMETERS = MODEL + MONITORING + NAMES + tuple(
         dataclasses.replace(spec, read_only=True) for spec in GEOMETRY)
 
-    def __init__(self, model=None, **options):
+    def __init__(self, model: MuscleModel | None = None, **options: Any) -> None:
         super().__init__('model_monitor', **options)
         parameters = self._parameters = Parameters(
             self, self.PARAMETERS, check=BicepGeometry.from_mapping)
@@ -62,7 +69,9 @@ class MonitorNode(Node):
         self.get_logger().info(f'kernels ready in {self._ready_after:.1f} s')
         self._observer = model.observer()
         self._voltage = self._ambient = self._residual = math.nan
-        self._start = self._time = self._fine_until = None
+        self._start: float | None = None
+        self._time: float | None = None
+        self._fine_until = math.nan
         self._measured = self._predicted = 0
         self._diagnostics = Diagnostics(
             self, parameters['hardware_id'], self._values, 'following the arm')
@@ -77,18 +86,18 @@ class MonitorNode(Node):
                 Temperature, 'ambient_temperature', self._on_ambient, MEASUREMENTS)
         self.create_service(Trigger, '~/reset', self._on_reset)
 
-    def _forget(self):
+    def _forget(self) -> None:
         self._observer.reset()
         self._start = self._time = None
 
-    def _on_voltage(self, message):
+    def _on_voltage(self, message: Float64) -> None:
         if math.isfinite(message.data):
             self._voltage = message.data
 
-    def _on_ambient(self, message):
+    def _on_ambient(self, message: Temperature) -> None:
         self._ambient = message.temperature
 
-    def _on_joint_states(self, message):
+    def _on_joint_states(self, message: JointState) -> None:
         self._measured += 1
         angle = read_angle(message, self._parameters['joint_name'])
         if angle is None or not math.isfinite(angle) or not math.isfinite(self._voltage):
@@ -109,33 +118,33 @@ class MonitorNode(Node):
         self._prediction.publish(output)
         self._difference.publish(Float64(data=self._residual))
         self._predicted += 1
-        self._judge()
+        self._judge(time)
 
-    def _judge(self):
+    def _judge(self, now: float) -> None:
         limit, time = self._parameters['residual_limit'], self._parameters['residual_time']
         if abs(self._residual) <= limit:
-            self._fine_until = self._time
+            self._fine_until = now
             # Half the limit: a residual near it is not to come and go with each sample.
             if abs(self._residual) <= 0.5 * limit:
                 self._diagnostics.clear('residual')
-        elif self._time - self._fine_until >= time:
+        elif now - self._fine_until >= time:
             self._diagnostics.set('residual', WARN, (
                 f'the arm has been more than {limit:g} rad off the model for {time:g} s, now '
                 f'{self._residual:+.3f} rad; record a run and try `hysteresis diagnose`'))
 
-    def _on_reset(self, request, response):
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._forget()
         response.success = True
         response.message = 'memory wiped; the prediction starts from the cold arm'
         self.get_logger().info(response.message)
         return response
 
-    def _values(self):
+    def _values(self) -> dict[str, Any]:
         return {'angles received': self._measured, 'angles predicted': self._predicted,
                 'applied voltage [V]': self._voltage, 'residual [rad]': self._residual,
                 'kernels ready after [s]': self._ready_after}
 
 
-def main(args=None) -> int:
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node."""
     return run(MonitorNode, args)

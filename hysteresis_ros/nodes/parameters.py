@@ -9,10 +9,13 @@ type, out of range or at odds with the others is refused with the reason, at sta
 start (file, launch argument or ``-p``); ``ros2 param set`` on one is answered with a refusal.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import difflib
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, TYPE_CHECKING
 
 import yaml
 from rcl_interfaces.msg import (
@@ -21,6 +24,10 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 
 from hysteresis_ros.errors import HysteresisError, ParameterError
 from hysteresis_ros.share import share_path
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+    from rclpy.parameter import Parameter
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +63,7 @@ class Spec:
         """Return what ``ros2 param describe`` shows."""
         descriptor = ParameterDescriptor(
             name=self.name, description=self._sentence(), read_only=self.read_only)
-        if self.low is not None:
+        if self.low is not None and self.high is not None:
             if isinstance(self.default, float):
                 descriptor.floating_point_range = [
                     FloatingPointRange(from_value=float(self.low), to_value=float(self.high))]
@@ -71,7 +78,7 @@ class Spec:
         """Return in words what values are taken."""
         kind = {bool: 'true or false', int: 'a whole number', float: 'a number with a decimal '
                 'point', str: 'text'}[type(self.default)]
-        if self.low is None:
+        if self.low is None or self.high is None:
             return kind
         return f'{kind} from {self.low:g} to {self.high:g} {self.unit}'.rstrip()
 
@@ -140,7 +147,7 @@ def check_limits(values: Mapping, quantity: str) -> None:
             f'minimum_{quantity} {low:g} has to be below maximum_{quantity} {high:g}')
 
 
-class Parameters(Mapping):
+class Parameters(Mapping[str, Any]):
     """
     The declared parameters of one node, as a mapping from name to present value.
 
@@ -162,12 +169,13 @@ class Parameters(Mapping):
         If a value given at start is refused.
     """
 
-    def __init__(self, node, specs: Iterable[Spec], check: Callable[[Mapping], None] = None,
-                 changed: Callable[[Mapping], None] = None):
+    def __init__(self, node: Node, specs: Iterable[Spec],
+                 check: Callable[[Mapping], object] | None = None,
+                 changed: Callable[[Parameters], None] | None = None) -> None:
         self._specs = {spec.name: spec for spec in specs}
         self._check = check or (lambda values: None)
         self._changed = changed or (lambda values: None)
-        self._values = {}
+        self._values: dict[str, Any] = {}
         for spec in self._specs.values():
             self._values[spec.name] = _declare(node, spec)
         self._refuse(self._values)
@@ -175,39 +183,39 @@ class Parameters(Mapping):
         node.add_on_set_parameters_callback(self._on_set)
         node.add_post_set_parameters_callback(self._on_changed)
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> Any:
         return self._values[name]
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         return iter(self._values)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._values)
 
-    def _refuse(self, values):
+    def _refuse(self, values: Mapping[str, Any]) -> None:
         for name, value in values.items():
             if isinstance(value, float) and not math.isfinite(value):
                 raise ParameterError(f'parameter {name} is {value}; it has to be finite')
         self._check(values)
 
-    def _on_set(self, parameters):
+    def _on_set(self, parameters: Iterable[Parameter]) -> SetParametersResult:
         try:
             self._refuse({**self._values, **self._own(parameters)})
         except HysteresisError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _on_changed(self, parameters):
+    def _on_changed(self, parameters: Iterable[Parameter]) -> None:
         values = self._own(parameters)
         if values:
             self._values.update(values)
             self._changed(self)
 
-    def _own(self, parameters):
+    def _own(self, parameters: Iterable[Parameter]) -> dict[str, Any]:
         return {parameter.name: parameter.value for parameter in parameters
                 if parameter.name in self._specs}
 
-    def _warn_of_unknown_names(self, node):
+    def _warn_of_unknown_names(self, node: Node) -> None:
         """Warn of given names that neither this node nor the common file knows: misspelt ones."""
         for name in sorted(set(node._parameter_overrides).difference(common_names())):
             if node.has_parameter(name) or name.startswith('qos_overrides.'):
@@ -217,7 +225,7 @@ class Parameters(Mapping):
             node.get_logger().warning(f'parameter {name} is not known and has no effect{hint}')
 
 
-def _declare(node, spec):
+def _declare(node: Node, spec: Spec) -> Any:
     try:
         return node.declare_parameter(spec.name, spec.default, spec.descriptor()).value
     except (InvalidParameterTypeException, InvalidParameterValueException):

@@ -2,12 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the nodes take from the model file and from the geometry in their parameters."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
 from hysteresis_ros.errors import ModelFileError, RangeError
 from hysteresis_ros.share import share_path
+
+if TYPE_CHECKING:
+    from builtin_interfaces.msg import Time
+    from rclpy.impl.rcutils_logger import RcutilsLogger
+    from sensor_msgs.msg import JointState
+
+    from hysteresis_ros.model import MuscleModel
 
 # The model's effects move an angle by a few degrees; each pass leaves a few percent of that.
 PASSES = 6
@@ -15,7 +25,7 @@ PASSES = 6
 STAGES = ('mechanism', 'sensor')
 
 
-def load_model(path: str, values: Mapping, logger):
+def load_model(path: str, values: Mapping, logger: RcutilsLogger) -> MuscleModel:
     """
     Load a model and give it the arm that the node's parameters describe.
 
@@ -40,7 +50,7 @@ def load_model(path: str, values: Mapping, logger):
         If it cannot be read.
     """
     from hysteresis_ros.model import MuscleModel   # SciPy: not needed without a model
-    path = path or share_path('config/bicep_model.yaml')
+    path = path or str(share_path('config/bicep_model.yaml'))
     model = MuscleModel.load(path)
     if model.drive != 'voltage' or model.length_stage is None:
         raise ModelFileError(f'{path}: the nodes need a model from voltage to length; identify one '
@@ -55,7 +65,7 @@ def load_model(path: str, values: Mapping, logger):
     return dataclasses.replace(model, geometry=geometry)
 
 
-def needs_ambient(model) -> bool:
+def needs_ambient(model: MuscleModel) -> bool:
     """Whether an effect of the model asks for the recorded ambient temperature."""
     return any(effect.needs_column == 'ambient_temperature' for effect in model.effects)
 
@@ -72,7 +82,7 @@ class ArmReference:
         Its effects of the arm and of the sensor are undone; none without it.
     """
 
-    def __init__(self, geometry: BicepGeometry, model=None):
+    def __init__(self, geometry: BicepGeometry, model: MuscleModel | None = None) -> None:
         self._geometry = geometry
         if model is None or not any(effect.stage in STAGES for effect in model.effects):
             self.reference = self._probe = geometry.reference
@@ -97,7 +107,7 @@ class ArmReference:
         return theta
 
 
-def read_reference(message, muscle: str) -> Reference:
+def read_reference(message: JointState, muscle: str) -> Reference:
     """
     Take one muscle's reference out of a `sensor_msgs.msg.JointState`.
 
@@ -125,7 +135,7 @@ def read_reference(message, muscle: str) -> Reference:
     return reference
 
 
-def read_angle(message, joint: str) -> float | None:
+def read_angle(message: JointState, joint: str) -> float | None:
     """Take one joint's angle [rad] out of a `JointState`; None if the message has none."""
     if joint not in message.name:
         return None
@@ -133,6 +143,6 @@ def read_angle(message, joint: str) -> float | None:
     return message.position[index] if index < len(message.position) else None
 
 
-def seconds(stamp) -> float:
+def seconds(stamp: Time) -> float:
     """Return a `builtin_interfaces.msg.Time` in seconds."""
     return stamp.sec + 1e-9 * stamp.nanosec

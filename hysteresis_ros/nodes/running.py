@@ -2,18 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """The main function that all nodes share: start, spin, and a clean end however it comes."""
 
+from __future__ import annotations
+
 import gc
 import signal
 import socket
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from hysteresis_ros.errors import HysteresisError, ParameterError
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
 
 ENDING = (signal.SIGINT, signal.SIGTERM)
 
@@ -73,9 +79,9 @@ class Ending:
     the second signal changes nothing.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.has_come = False
-        self._wake = None
+        self._wake: Callable[[], object] | None = None
         self._heard, self._signalled = socket.socketpair()
         self._signalled.setblocking(False)
         for number in ENDING:
@@ -88,23 +94,23 @@ class Ending:
         """Have `wake`, which takes nothing, called from another thread when the end comes."""
         self._wake = wake
 
-    def _listen(self):
+    def _listen(self) -> None:
         self._heard.recv(1)
         self.has_come = True
         if self._wake is not None:
             self._wake()
 
 
-def _start_rclpy(args):
+def _start_rclpy(args: Sequence[str] | None) -> None:
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:   # what rclpy makes of arguments that it cannot read
         raise ParameterError(f'ROS arguments: {error}') from None
 
 
-def _end(node):
+def _end(node: Node | None) -> int:
     try:
-        if hasattr(node, 'on_shutdown'):
+        if node is not None and hasattr(node, 'on_shutdown'):
             node.on_shutdown()
         return 0
     except (HysteresisError, OSError) as error:
@@ -115,7 +121,7 @@ def _end(node):
         rclpy.try_shutdown()
 
 
-def _fail(error):
+def _fail(error: BaseException) -> int:
     line = ' '.join(str(error).split())
     print(f'error: {line}', file=sys.stderr, flush=True)
     return 1

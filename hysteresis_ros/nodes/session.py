@@ -6,13 +6,16 @@ A recorded session with the arm: the nodes as processes, target angles published
 What a user does by hand with ``ros2 run``, ``ros2 topic pub`` and ``ros2 bag record``.
 """
 
+from collections.abc import Callable, Sequence
 import os
 from pathlib import Path
 import signal
 import subprocess
 import sys
 import time
+from typing import Any
 
+from hysteresis_ros.atomic import AnyPath
 import numpy as np
 import rclpy
 from rclpy.node import Node
@@ -56,7 +59,7 @@ class Bag:
         If the package rosbags is not installed, or the folder exists.
     """
 
-    def __init__(self, folder):
+    def __init__(self, folder: AnyPath) -> None:
         try:
             from rosbags.rosbag2 import StoragePlugin, Writer
             from rosbags.typesys import Stores, get_typestore
@@ -75,7 +78,7 @@ class Bag:
             for name, (kind, _, _) in TOPICS.items()}
         self.count = 0
 
-    def write(self, name, stamp, message) -> None:
+    def write(self, name: str, stamp: int, message: Any) -> None:
         """Write one message received at `stamp` [ns]."""
         self._writer.write(self._connections[name], stamp, serialize_message(message))
         self.count += 1
@@ -97,7 +100,7 @@ class Processes:
         File that takes what they print.
     """
 
-    def __init__(self, parameters: dict, log):
+    def __init__(self, parameters: dict, log: AnyPath) -> None:
         arguments = ['--ros-args']
         for name, value in parameters.items():
             text = str(value).lower() if isinstance(value, bool) else str(value)
@@ -151,11 +154,11 @@ class Session(Node):
         Whether the bridge publishes /clock.
     """
 
-    def __init__(self, bag: Bag, simulated_time: bool):
+    def __init__(self, bag: Bag, simulated_time: bool) -> None:
         super().__init__('recorded_session', parameter_overrides=[
             Parameter('use_sim_time', value=simulated_time)])
         self._bag = bag
-        self._last_angle = None
+        self._last_angle: float | None = None
         self._heard = time.monotonic()
         self._publisher = self.create_publisher(Float64, 'target_angle', COMMANDS)
         for name, (_, kind, qos) in TOPICS.items():
@@ -164,7 +167,7 @@ class Session(Node):
         self._initialise = self.create_client(Trigger, 'hardware_bridge/initialise')
         self._reset = self.create_client(Trigger, 'hysteresis_compensator/reset')
 
-    def _record(self, name, message):
+    def _record(self, name: str, message: Any) -> None:
         if name == 'joint_states':
             self._heard = time.monotonic()
             self._last_angle = message.position[0] if message.position else None
@@ -176,7 +179,8 @@ class Session(Node):
         """Time of the node's clock [s]."""
         return 1e-9 * self.get_clock().now().nanoseconds
 
-    def wait(self, ready, processes, patience: float, what: str) -> None:
+    def wait(self, ready: Callable[[], bool], processes: Processes, patience: float,
+             what: str) -> None:
         """Spin until `ready()`; BoardError after `patience` wall seconds without it."""
         end = time.monotonic() + patience
         while not ready():
@@ -185,9 +189,9 @@ class Session(Node):
             if time.monotonic() > end:
                 raise BoardError(f'{what} did not happen within {patience:.0f} s')
 
-    def ready(self, processes) -> None:
+    def ready(self, processes: Processes) -> None:
         """Wait until every node is there and listens."""
-        def listening():
+        def listening() -> bool:
             return (self._initialise.service_is_ready() and self._reset.service_is_ready()
                     and self._publisher.get_subscription_count() >= 2
                     and self.count_subscribers('muscle_reference') >= 2
@@ -195,7 +199,7 @@ class Session(Node):
                     and self._last_angle is not None and self.now() > 0.0)
         self.wait(listening, processes, START_PATIENCE, 'the start of the nodes')
 
-    def heat_and_cool(self, processes) -> None:
+    def heat_and_cool(self, processes: Processes) -> None:
         """Wipe the model's memory, then the muscle's; else it would be driven again."""
         for client, what in ((self._reset, 'the reset of the compensator'),
                              (self._initialise, 'the heat and cool cycle')):
@@ -204,7 +208,8 @@ class Session(Node):
             if not answer.result().success:
                 raise BoardError(f'{what} was refused: {answer.result().message}')
 
-    def drive(self, targets, hold: float, processes, progress) -> np.ndarray:
+    def drive(self, targets: np.ndarray, hold: float, processes: Processes,
+              progress: Callable[[], object]) -> np.ndarray:
         """
         Publish targets and return the angle at the end of each hold.
 
@@ -238,7 +243,8 @@ class Session(Node):
         return np.array(reached)
 
 
-def record(folder, sequences, parameters: dict, hold: float, progress=lambda: None) -> list:
+def record(folder: AnyPath, sequences: Sequence[np.ndarray], parameters: dict, hold: float,
+           progress: Callable[[], object] = lambda: None) -> list:
     """
     Run the three nodes through target sequences and record a bag.
 

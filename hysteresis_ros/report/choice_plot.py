@@ -2,10 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The picture of operators side by side: their error over what they cost."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from hysteresis_ros.report.drawing import new_figure
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def choice_figure(choice):
+    from hysteresis_ros.identification.choice import Choice
+
+
+def choice_figure(choice: Choice) -> Figure:
     """
     Draw the error on rows held out over the number of parameters and over the time of a step.
 

@@ -2,11 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The comparison as one HTML page."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from typing import TYPE_CHECKING
+
 from hysteresis_ros import __version__
 from hysteresis_ros.report import page
 from hysteresis_ros.report.drawing import png
 from hysteresis_ros.comparison.where import number
 from hysteresis_ros.measurements.quantities import shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from hysteresis_ros.comparison.compare import Comparison
 
 CAPTIONS = {
     'overlay': 'Measured and predicted response, and below what is left; the grey band is the '
@@ -21,7 +32,7 @@ CAPTIONS = {
 }
 
 
-def comparison_page(comparison, pictures, model_path):
+def comparison_page(comparison: Comparison, pictures: Mapping[str, bytes], model_path: str) -> str:
     """
     Build the page.
 
@@ -62,7 +73,7 @@ def comparison_page(comparison, pictures, model_path):
                      footer=f'hysteresis_ros {__version__}')
 
 
-def summary(comparison):
+def summary(comparison: Comparison) -> str:
     """
     Say in one or two sentences how good the model is.
 
@@ -86,7 +97,7 @@ def summary(comparison):
     return text
 
 
-def trials(comparison, most=60):
+def trials(comparison: Comparison, most: int = 60) -> list[str]:
     """Return the table of the trials as HTML parts, the worst first if they are many."""
     unit, scale = shown(comparison.quantity)
     header = ['trial', 'rows', f'mean |e| [{unit}]', f'RMSE [{unit}]', 'linear RMSE', 'file']
@@ -102,6 +113,6 @@ def trials(comparison, most=60):
     return [*note, page.table(header, rows)]
 
 
-def rendered(drawn):
+def rendered(drawn: Mapping[str, Figure]) -> dict[str, bytes]:
     """Return the PNG files of figures, dict of str to bytes."""
     return {name: png(figure) for name, figure in drawn.items()}

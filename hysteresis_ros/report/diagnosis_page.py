@@ -2,25 +2,40 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnosis and extension as one self-contained page: the plain verdict first."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from hysteresis_ros import __version__
-from hysteresis_ros.atomic import write_text
+from hysteresis_ros.atomic import AnyPath, write_text
 from hysteresis_ros.report import page
-from hysteresis_ros.comparison.compare import compare
+from hysteresis_ros.comparison.compare import compare, Comparison
 from hysteresis_ros.report.comparison_page import CAPTIONS
 from hysteresis_ros.report.drawing import new_figure, png
-from hysteresis_ros.report.plots import figures
+from hysteresis_ros.report.plots import figures, ranking
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.comparison.where import number
 from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
 from hysteresis_ros.measurements.quantities import shown
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from hysteresis_ros.diagnosis.extend import Extension
+    from hysteresis_ros.diagnosis.verdict import Diagnosis
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model import MuscleModel
+
 MOST_ROWS = 15
 BEFORE, AFTER = '#b0b0b0', '#1f77b4'
 
 
-def write_diagnosis(path, model, measurements, found, model_path) -> None:
+def write_diagnosis(path: AnyPath, model: MuscleModel, measurements: Sequence[Measurement],
+                    found: Diagnosis, model_path: str) -> None:
     """
     Write the page of a diagnosis.
 
@@ -46,7 +61,7 @@ def write_diagnosis(path, model, measurements, found, model_path) -> None:
     parts += _where(before)
     if found.ranking:
         parts.append(page.section('Effects, by what they do on rows not fitted', page.picture(
-            png(_ranking_figure(found, scale, unit)),
+            png(ranking(found, MOST_ROWS)),
             'Error with each effect added alone, with 95 % intervals; hollow: outside its physical '
             'range. Dashed: the error without it.'), _ranking_table(found, scale, unit)))
     alternatives = [f'{name} cannot be told from {", ".join(others)}' for name, others in zip(
@@ -70,7 +85,9 @@ def write_diagnosis(path, model, measurements, found, model_path) -> None:
     _write(path, 'What the model is missing', parts)
 
 
-def write_extension(path, model, extension, train, test, model_path) -> None:
+def write_extension(path: AnyPath, model: MuscleModel, extension: Extension,
+                    train: Sequence[Measurement], test: Sequence[Measurement],
+                    model_path: str) -> None:
     """
     Write the page of an extension.
 
@@ -108,11 +125,11 @@ def write_extension(path, model, extension, train, test, model_path) -> None:
     _write(path, 'The extended model', parts)
 
 
-def _write(path, title, parts):
+def _write(path: AnyPath, title: str, parts: Sequence[str]) -> None:
     write_text(path, page.page(title, *parts, footer=f'hysteresis_ros {__version__}'))
 
 
-def _where(comparison):
+def _where(comparison: Comparison) -> list[str]:
     pictures = figures(comparison)
     return [page.section('Where it fails', *(
         [page.listing([region.text for region in comparison.where])] if comparison.where
@@ -121,7 +138,7 @@ def _where(comparison):
           for name in ('overlay', 'signals', 'loop') if name in pictures])]
 
 
-def _before_and_after(before, after, scale, unit):
+def _before_and_after(before: Comparison, after: Comparison, scale: float, unit: str) -> list[str]:
     pictures = figures(after)
     parts = [page.picture(png(_residuals(before, after, scale, unit)),
                           'What is left before and after, on the same axes.')]
@@ -131,7 +148,7 @@ def _before_and_after(before, after, scale, unit):
     return [page.section('Before and after', page.table(header, rows), *parts)]
 
 
-def _residuals(before, after, scale, unit):
+def _residuals(before: Comparison, after: Comparison, scale: float, unit: str) -> Figure:
     figure, axes = new_figure(10.0, 3.2)
     axis = axes[0, 0]
     step = max(1, before.rows // 4000)
@@ -145,25 +162,7 @@ def _residuals(before, after, scale, unit):
     return figure
 
 
-def _ranking_figure(found, scale, unit):
-    rows = found.ranking[:MOST_ROWS][::-1]
-    figure, axes = new_figure(8.5, 0.8 + 0.28 * len(rows))
-    axis = axes[0, 0]
-    for place, row in enumerate(rows):
-        chosen = row['effect'] in found.missing
-        colour = '#2ca02c' if chosen else AFTER
-        ends = [scale * row['rmse_before'] * (1.0 - row[key]) for key in ('gain_high', 'gain_low')]
-        axis.plot(ends, [place, place], color=colour, lw=2.0 if chosen else 1.2)
-        axis.plot(scale * row['rmse_after'], place, 'o', color=colour,
-                  mfc=colour if row['plausible'] else 'white')
-    axis.axvline(scale * found.rmse_before, color='black', ls='--', lw=0.9)
-    axis.set_yticks(range(len(rows)), [row['effect'] for row in rows])
-    axis.set_xlabel(f'RMSE on rows not fitted [{unit}]')
-    axis.set_xlim(left=0.0)
-    return figure
-
-
-def _ranking_table(found, scale, unit):
+def _ranking_table(found: Diagnosis, scale: float, unit: str) -> str:
     rows = []
     for row in found.ranking[:MOST_ROWS]:
         values = parameters_in_words(row['parameters'])
@@ -177,7 +176,7 @@ def _ranking_table(found, scale, unit):
                        'absorb', 'plausible', 'parameters'], rows, strong)
 
 
-def _provenance(model_path, measurements):
+def _provenance(model_path: str, measurements: Sequence[Measurement]) -> str:
     return page.section('Provenance', page.listing(
         [f'model: {model_path}', *[f'measurement: {m.source} ({m.digest[:12]})'
                                    for m in measurements]], ordered=False))

@@ -7,17 +7,27 @@ matplotlib is imported where something is drawn, through its figures alone: no w
 no global state.
 """
 
+from __future__ import annotations
+
 import base64
+import functools
 import io
+from typing import Any, TYPE_CHECKING, TypeVar
 
 from hysteresis_ros.comparison.signals import label
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# One value or an array of them.
+Values = TypeVar('Values', float, np.ndarray)
 
 MOST_POINTS = 4000
 MOST_DOTS = 5000
 
 
-def png(figure, dpi=110):
+def png(figure: Figure, dpi: float = 110) -> bytes:
     """
     Render a figure.
 
@@ -40,16 +50,29 @@ def png(figure, dpi=110):
     return stream.getvalue()
 
 
-def data_address(picture):
+def data_address(picture: bytes) -> str:
     """Return a PNG file's bytes as an address that a page can hold in itself."""
     return 'data:image/png;base64,' + base64.b64encode(picture).decode('ascii')
 
 
-def new_figure(width, height, rows=1, columns=1, **options):
-    """Return a figure and its axes, ndarray of Axes (rows, columns)."""
+@functools.cache
+def figure_class() -> type[Figure]:
+    """Return the class of our figures, which a notebook shows without pyplot."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout='constrained')
+    class NotebookFigure(Figure):
+        """A figure that IPython shows as a PNG picture."""
+
+        def _repr_png_(self) -> bytes:
+            return png(self)
+
+    return NotebookFigure
+
+
+def new_figure(width: float, height: float, rows: int = 1, columns: int = 1,
+               **options: Any) -> tuple[Figure, np.ndarray]:
+    """Return a figure and its axes, ndarray of Axes (rows, columns)."""
+    figure = figure_class()(figsize=(width, height), layout='constrained')
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     for axis in axes.flat:
         axis.grid(True, color='#dddddd', linewidth=0.6)
@@ -60,18 +83,19 @@ def new_figure(width, height, rows=1, columns=1, **options):
     return figure, axes
 
 
-def axis_label(name):
+def axis_label(name: str) -> str:
     """Return a signal's name and unit for an axis."""
     text, unit, _ = label(name)
     return f'{text} [{unit}]' if unit else text
 
 
-def scaled(name, values):
+def scaled(name: str, values: Values) -> Values:
     """Return values in the unit that `axis_label` names."""
     return values * label(name)[2]
 
 
-def thinned(x, y, most=MOST_POINTS):
+def thinned(x: np.ndarray, y: np.ndarray,
+            most: int = MOST_POINTS) -> tuple[np.ndarray, np.ndarray]:
     """
     Leave out points that a line does not need: each stretch keeps its extremes.
 
@@ -100,6 +124,6 @@ def thinned(x, y, most=MOST_POINTS):
     return x[chosen], y[chosen]
 
 
-def some_rows(rows, most=MOST_DOTS):
+def some_rows(rows: int, most: int = MOST_DOTS) -> np.ndarray:
     """Return evenly chosen rows, an index for scatter plots."""
     return np.linspace(0, rows - 1, min(rows, most)).astype(int)

@@ -7,6 +7,7 @@ Every function escapes the text it is given, names of files and columns included
 HTML that `page` puts together.
 """
 
+from collections.abc import Collection, Iterable, Sequence
 from html import escape
 
 from hysteresis_ros.report.drawing import data_address
@@ -48,7 +49,7 @@ footer { margin-top: 2.5rem; color: #5a6672; font-size: .85rem; }
 """
 
 
-def page(title, *parts, footer=''):
+def page(title: str, *parts: str, footer: str = '') -> str:
     """
     Put a page together.
 
@@ -76,33 +77,34 @@ def page(title, *parts, footer=''):
         + f'\n<footer>{escape(footer)}</footer>\n</body>\n</html>\n')
 
 
-def section(heading, *parts):
+def section(heading: str, *parts: str) -> str:
     """Return a part of the page under a heading (str); the parts are HTML."""
     return f'<section>\n<h2>{escape(heading)}</h2>\n' + '\n'.join(parts) + '\n</section>'
 
 
-def paragraph(text):
+def paragraph(text: str) -> str:
     """Return a paragraph of text."""
     return f'<p>{escape(text)}</p>'
 
 
-def verdict(text):
+def verdict(text: str) -> str:
     """Return the sentence that a hurried reader should see, set apart."""
     return f'<p class="verdict">{escape(text)}</p>'
 
 
-def warning(text):
+def warning(text: str) -> str:
     """Return something that a reader should not overlook."""
     return f'<p class="warning">{escape(text)}</p>'
 
 
-def listing(items, ordered=True):
+def listing(items: Iterable[str], ordered: bool = True) -> str:
     """Return a list of texts, numbered or not."""
     tag = 'ol' if ordered else 'ul'
     return f'<{tag}>' + ''.join(f'<li>{escape(item)}</li>' for item in items) + f'</{tag}>'
 
 
-def table(header, rows, strong=()):
+def table(header: Sequence[str], rows: Sequence[Sequence[str]],
+          strong: Collection[int] = ()) -> str:
     """
     Return a table that scrolls sideways on a narrow screen.
 
@@ -127,7 +129,7 @@ def table(header, rows, strong=()):
             f'<tbody>\n{body}</tbody>\n</table></div>')
 
 
-def picture(png, caption):
+def picture(png: bytes, caption: str) -> str:
     """
     Return a picture that is part of the page.
 
@@ -148,7 +150,7 @@ def picture(png, caption):
             f'<figcaption>{text}</figcaption></figure>')
 
 
-def details(summary, *parts):
+def details(summary: str, *parts: str) -> str:
     """Return parts that are folded away until a reader asks for them."""
     return (f'<details><summary>{escape(summary)}</summary>\n' + '\n'.join(parts)
             + '\n</details>')

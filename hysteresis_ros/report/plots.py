@@ -6,20 +6,37 @@ The pictures of a comparison.
 Lines differ in shape and lightness, so that grey print keeps them.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from typing import Any, TYPE_CHECKING
+
 from hysteresis_ros.report.drawing import axis_label, new_figure, scaled, some_rows, thinned
 from hysteresis_ros.comparison.signals import label
 from hysteresis_ros.comparison.where import binned, blocks_of, correlogram
+from hysteresis_ros.measurements.quantities import shown
 import numpy as np
 
-MEASURED = {'color': '#000000', 'linewidth': 1.3, 'linestyle': '-'}
-MODEL = {'color': '#2f6db5', 'linewidth': 1.3, 'linestyle': (0, (5, 1.5))}
-LINEAR = {'color': '#d98a1f', 'linewidth': 1.3, 'linestyle': (0, (1, 1))}
-DOTS = {'color': '#9aa7b5', 'markersize': 2.0, 'linestyle': 'none', 'marker': '.', 'alpha': 0.5}
-MEANS = {'color': '#12355b', 'linewidth': 1.4, 'marker': 'o', 'markersize': 3.5, 'capsize': 2.5}
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from hysteresis_ros.comparison.compare import Comparison
+    from hysteresis_ros.diagnosis.verdict import Diagnosis
+
+MEASURED: dict[str, Any] = {'color': '#000000', 'linewidth': 1.3, 'linestyle': '-'}
+MODEL: dict[str, Any] = {'color': '#2f6db5', 'linewidth': 1.3, 'linestyle': (0, (5, 1.5))}
+LINEAR: dict[str, Any] = {'color': '#d98a1f', 'linewidth': 1.3, 'linestyle': (0, (1, 1))}
+DOTS: dict[str, Any] = {'color': '#9aa7b5', 'markersize': 2.0, 'linestyle': 'none',
+                        'marker': '.', 'alpha': 0.5}
+MEANS: dict[str, Any] = {'color': '#12355b', 'linewidth': 1.4, 'marker': 'o',
+                         'markersize': 3.5, 'capsize': 2.5}
 SIGNED = 'cividis'
+FOUND, TRIED = '#2ca02c', '#1f77b4'
 
 
-def figures(comparison):
+def figures(comparison: Comparison) -> dict[str, Figure]:
     """
     Draw everything that a comparison has to show.
 
@@ -51,7 +68,7 @@ def figures(comparison):
     return drawn
 
 
-def overlay(comparison):
+def overlay(comparison: Comparison) -> Figure:
     """
     Draw measured and predicted response, and below what is left.
 
@@ -90,7 +107,7 @@ def overlay(comparison):
     return figure
 
 
-def along(comparison):
+def along(comparison: Comparison) -> tuple[np.ndarray, str]:
     """Return what runs along a recording, (rows,), and its name: time, or the row's number."""
     if comparison.time is None:
         return np.arange(comparison.rows, dtype=float), 'row'
@@ -101,7 +118,7 @@ def along(comparison):
     return comparison.time, 'time [s]'
 
 
-def residual_against_signals(comparison):
+def residual_against_signals(comparison: Comparison) -> Figure:
     """
     Draw the residual against every signal, with binned means and their 95 % intervals.
 
@@ -130,7 +147,8 @@ def residual_against_signals(comparison):
     return figure
 
 
-def against(axis, comparison, name, values, residual, block):
+def against(axis: Axes, comparison: Comparison, name: str, values: np.ndarray,
+            residual: np.ndarray, block: np.ndarray) -> None:
     """Draw the residual against one signal into an axis."""
     quantity = comparison.quantity
     chosen = some_rows(len(values))
@@ -154,7 +172,7 @@ def against(axis, comparison, name, values, residual, block):
         axis.set_xlim(-1.5, 1.5)
 
 
-def residual_on_loop(comparison):
+def residual_on_loop(comparison: Comparison) -> Figure:
     """
     Draw the hysteresis loop, measured and predicted, coloured by the residual.
 
@@ -178,7 +196,7 @@ def residual_on_loop(comparison):
         for trial in np.unique(comparison.trial[chosen]):
             inside = comparison.trial[chosen] == trial
             axes[0, 0].plot(x[inside], scaled(quantity, values[chosen][inside]), label=text, **line)
-            text = None
+            text = ''     # once in the legend
     axes[0, 0].legend(fontsize=8, ncols=2, frameon=False, loc='lower left', bbox_to_anchor=(0, 1))
     coloured(figure, axes[0, 1], x, scaled(quantity, comparison.measured[chosen]),
              comparison.residual[chosen], quantity)
@@ -189,7 +207,8 @@ def residual_on_loop(comparison):
     return figure
 
 
-def coloured(figure, axis, x, y, residual, quantity):
+def coloured(figure: Figure, axis: Axes, x: np.ndarray, y: np.ndarray, residual: np.ndarray,
+             quantity: str) -> None:
     """Scatter points whose lightness is the residual, with its scale beside them."""
     limit = max(scaled(quantity, float(np.quantile(np.abs(residual), 0.99))), 1e-12)
     order = np.argsort(np.abs(residual))
@@ -200,13 +219,13 @@ def coloured(figure, axis, x, y, residual, quantity):
     bar.ax.tick_params(labelsize=8)
 
 
-def load_of(comparison):
+def load_of(comparison: Comparison) -> str | None:
     """Return the name of the load that varies, or None."""
     return next((name for name in ('force', 'stress') if name in comparison.signals
                  and name != comparison.drive), None)
 
 
-def waterfall(steps, floor, quantity):
+def waterfall(steps: Sequence[tuple[str, float]], floor: float | None, quantity: str) -> Figure:
     """
     Draw how the error falls with every effect that was added.
 
@@ -214,8 +233,8 @@ def waterfall(steps, floor, quantity):
     ----------
     steps : list of (str, float)
         What the model had and its RMSE, in the unit of files; the first without the effects.
-    floor : float
-        RMSE that the noise leaves.
+    floor : float or None
+        RMSE that the noise leaves; None where it is not known.
     quantity : str
         The response.
 
@@ -233,9 +252,10 @@ def waterfall(steps, floor, quantity):
     for row, value in enumerate(values):
         axis.annotate(f'{value:.3g}', (value, row), (4, 0), textcoords='offset points',
                       va='center', fontsize=8)
-    axis.axvline(scaled(quantity, floor), color='black', linewidth=1.0, linestyle=':')
-    axis.annotate('noise', (scaled(quantity, floor), -0.5), (3, 0), textcoords='offset points',
-                  fontsize=7, va='bottom')
+    if floor is not None:
+        axis.axvline(scaled(quantity, floor), color='black', linewidth=1.0, linestyle=':')
+        axis.annotate('noise', (scaled(quantity, floor), -0.5), (3, 0),
+                      textcoords='offset points', fontsize=7, va='bottom')
     axis.set_yticks(range(len(steps)), names)
     axis.set_ylim(len(steps) - 0.4, -0.7)
     axis.set_xlim(0, 1.12 * max(float(values.max()), 1e-12))
@@ -243,7 +263,40 @@ def waterfall(steps, floor, quantity):
     return figure
 
 
-def residual_on_plane(comparison, drive, load):
+def ranking(found: Diagnosis, most: int = 15) -> Figure:
+    """
+    Draw the error with each effect added alone, with 95 % intervals.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    most : int
+        Effects that are drawn, from the best on.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    """
+    unit, scale = shown(found.quantity)
+    rows = found.ranking[:most][::-1]
+    figure, axes = new_figure(8.5, 0.8 + 0.28 * max(len(rows), 2))
+    axis = axes[0, 0]
+    for place, row in enumerate(rows):
+        chosen = row['effect'] in found.missing
+        colour = FOUND if chosen else TRIED
+        ends = [scale * row['rmse_before'] * (1.0 - row[key]) for key in ('gain_high', 'gain_low')]
+        axis.plot(ends, [place, place], color=colour, lw=2.0 if chosen else 1.2)
+        axis.plot(scale * row['rmse_after'], place, 'o', color=colour,
+                  mfc=colour if row['plausible'] else 'white')
+    axis.axvline(scale * found.rmse_before, color='black', ls='--', lw=0.9)
+    axis.set_yticks(range(len(rows)), [row['effect'] for row in rows])
+    axis.set_xlabel(f'RMSE on rows not fitted [{unit or "1"}]')
+    axis.set_xlim(left=0.0)
+    return figure
+
+
+def residual_on_plane(comparison: Comparison, drive: str, load: str) -> Figure:
     """
     Draw the residual over drive and load, the plane in which the muscle works.
 
@@ -269,7 +322,7 @@ def residual_on_plane(comparison, drive, load):
     return figure
 
 
-def residual_since_step(comparison):
+def residual_since_step(comparison: Comparison) -> Figure:
     """
     Draw the residual against the time since the last step, logarithmic, by direction.
 
@@ -311,7 +364,7 @@ def residual_since_step(comparison):
     return figure
 
 
-def correlogram_of(comparison):
+def correlogram_of(comparison: Comparison) -> Figure:
     """
     Draw the autocorrelation of the residual with the band that white noise would stay in.
 
@@ -339,7 +392,7 @@ def correlogram_of(comparison):
     return figure
 
 
-def coverage(comparison):
+def coverage(comparison: Comparison) -> Figure:
     """
     Draw what the recording covers: where drive and response were, and how long.
 
@@ -354,11 +407,11 @@ def coverage(comparison):
     """
     names = [name for name in (comparison.drive, load_of(comparison),
                                f'{comparison.drive}_rate', 'ambient_temperature')
-             if name in comparison.signals]
+             if name is not None and name in comparison.signals]
     figure, axes = new_figure(9, 2.6, 1, len(names) + 1, sharey=False)
-    shown = [(name, comparison.signals[name]) for name in names]
-    shown.append((comparison.quantity, comparison.measured))
-    for axis, (name, values) in zip(axes[0], shown):
+    columns = [(name, comparison.signals[name]) for name in names]
+    columns.append((comparison.quantity, comparison.measured))
+    for axis, (name, values) in zip(axes[0], columns):
         low, high = np.quantile(values, [0.002, 0.998])
         axis.hist(scaled(name, np.clip(values, low, high)), bins=30, color='#9db7d3',
                   edgecolor='#12355b', linewidth=0.5)

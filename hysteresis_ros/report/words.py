@@ -2,12 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """A verdict as sentences that a person can act on, and the values of effects."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.effects import catalogue
 
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.verdict import Diagnosis
 
-def verdict_in_words(found) -> str:
+
+def verdict_in_words(found: Diagnosis) -> str:
     """
     Return the verdict of a diagnosis in plain words.
 

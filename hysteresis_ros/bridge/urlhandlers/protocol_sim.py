@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The port ``sim://bicep`` of pyserial: a thin coat over the laboratory's simulated port."""
 
+from collections.abc import Iterator
 import contextlib
+from typing import Any
 
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, to_bytes
 
@@ -10,7 +12,7 @@ from hysteresis_ros.laboratory.board.port import CableUnplugged, PortClosed, Sim
 
 
 @contextlib.contextmanager
-def _pyserial_errors():
+def _pyserial_errors() -> Iterator[None]:
     """Turn the errors of the simulated port into those that pyserial's users expect."""
     try:
         yield
@@ -31,11 +33,12 @@ class Serial(SerialBase):
 
     """
 
-    def __init__(self, *args, **kwargs):
-        self.simulation = None
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        self.simulation: SimulatedPort | None = None
+        self.is_open = False
         super().__init__(*args, **kwargs)
 
-    def open(self):
+    def open(self) -> None:
         """
         Open the port; the first time, build board and arm.
 
@@ -55,13 +58,13 @@ class Serial(SerialBase):
             self.simulation.open()
         self.is_open = True
 
-    def close(self):
+    def close(self) -> None:
         """Close the port. The arm goes on living; the board's watchdog looks after it."""
         if self.simulation is not None:
             self.simulation.close()
         self.is_open = False
 
-    def read(self, size=1):
+    def read(self, size: int = 1) -> bytes:
         """
         Read up to `size` bytes, waiting for them no longer than ``timeout``.
 
@@ -74,7 +77,7 @@ class Serial(SerialBase):
         with self._opened() as port:
             return port.read(size, self._timeout)
 
-    def write(self, data):
+    def write(self, data: bytes | bytearray | memoryview) -> int:
         """
         Write bytes to the board, which gets them at once.
 
@@ -84,53 +87,53 @@ class Serial(SerialBase):
             If the port is closed or the simulated cable is pulled.
 
         """
-        data = to_bytes(data)
+        content = bytes(to_bytes(data))
         with self._opened() as port:
-            port.write(data)
-        return len(data)
+            port.write(content)
+        return len(content)
 
-    def cancel_read(self):
+    def cancel_read(self) -> None:
         """Let a waiting `read` return with what it has."""
         with self._opened() as port:
             port.cancel_read()
 
     @property
-    def in_waiting(self):
+    def in_waiting(self) -> int:
         """Number of bytes that can be read without waiting."""
         with self._opened() as port:
             return port.in_waiting
 
     @property
-    def out_waiting(self):
+    def out_waiting(self) -> int:
         """Number of bytes still to be sent: none, ever."""
         return 0
 
-    def flush(self):
+    def flush(self) -> None:
         """Wait until everything is sent: it is."""
 
-    def reset_input_buffer(self):
+    def reset_input_buffer(self) -> None:
         """Throw away what has not been read."""
         with self._opened() as port:
             port.discard_input()
 
-    def reset_output_buffer(self):
+    def reset_output_buffer(self) -> None:
         """Throw away what has not been sent: nothing."""
 
     @contextlib.contextmanager
-    def _opened(self):
+    def _opened(self) -> Iterator[SimulatedPort]:
         if self.simulation is None:
             raise PortNotOpenError()
         with _pyserial_errors():
             yield self.simulation
 
-    def _reconfigure_port(self):
+    def _reconfigure_port(self) -> None:
         """Take new settings: baud rate and the like mean nothing here."""
 
-    def _update_break_state(self):
+    def _update_break_state(self) -> None:
         """Set the break condition: means nothing here."""
 
-    def _update_rts_state(self):
+    def _update_rts_state(self) -> None:
         """Set a line: means nothing here."""
 
-    def _update_dtr_state(self):
+    def _update_dtr_state(self) -> None:
         """Set a line: means nothing here."""

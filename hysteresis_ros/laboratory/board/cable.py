@@ -2,9 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cable between host and simulated board: it loses bytes, invents some, and can be pulled."""
 
-import random
+from __future__ import annotations
 
-from hysteresis_ros.laboratory.board.simulated_board import TICK
+import random
+from typing import TYPE_CHECKING
+
+from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
+
+if TYPE_CHECKING:
+    from hysteresis_ros.laboratory.board.url import Simulation
 
 
 class Cable:
@@ -20,7 +26,7 @@ class Cable:
 
     """
 
-    def __init__(self, board, simulation):
+    def __init__(self, board: SimulatedBoard, simulation: Simulation) -> None:
         self.board = board
         self.received = bytearray()     # what the host can read
         self._simulation = simulation
@@ -30,16 +36,16 @@ class Cable:
         self._to_host = random.Random(f'to host {simulation.seed}')
 
     @property
-    def time(self):
+    def time(self) -> float:
         """Time in s since the arm began to live."""
         return self._ticks * TICK / 1000.0
 
     @property
-    def plugged(self):
+    def plugged(self) -> bool:
         """Whether the cable is in."""
         return self._plugged
 
-    def write(self, data):
+    def write(self, data: bytes) -> None:
         """Take bytes from the host."""
         if not self._plugged:
             return
@@ -47,7 +53,7 @@ class Cable:
             self.board.receive(self._drop(data, self._to_board))
         self._fetch()
 
-    def tick(self):
+    def tick(self) -> None:
         """Let `TICK` ms pass."""
         plugged = not self._lasts('unplug')
         if plugged and not self._plugged:
@@ -62,11 +68,11 @@ class Cable:
         self._ticks += 1
         self._fetch()
 
-    def _lasts(self, fault):
+    def _lasts(self, fault: str) -> bool:
         begin = getattr(self._simulation, f'{fault}_after')
         return 0.0 <= self.time - begin < getattr(self._simulation, f'{fault}_for')
 
-    def _fetch(self):
+    def _fetch(self) -> None:
         data = self.board.transmit()
         if not data or not self._plugged or self._lasts('silent'):
             return
@@ -74,7 +80,7 @@ class Cable:
             self.received += self._to_host.randbytes(self._to_host.randint(1, 40))
         self.received += self._drop(data, self._to_host)
 
-    def _drop(self, data, rng):
+    def _drop(self, data: bytes, rng: random.Random) -> bytes:
         if not self._simulation.drop:
             return data
         return bytes(byte for byte in data if rng.random() >= self._simulation.drop)

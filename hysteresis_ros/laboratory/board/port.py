@@ -58,7 +58,7 @@ class SimulatedPort:
 
     """
 
-    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic):
+    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         simulation = parse_url(url)
         board = SimulatedBoard(make_plant(simulation).arm, supply=simulation.supply,
                                seed=simulation.seed, speed=simulation.speed,
@@ -69,7 +69,8 @@ class SimulatedPort:
         self._speed = simulation.speed
         self._origin = clock()  # wall time at which the arm's time was, or would have been, 0
         self._ticks = 0
-        self._outbox = collections.deque()      # what the host wrote, on its way to the board
+        # What the host wrote, on its way to the board.
+        self._outbox: collections.deque[bytes] = collections.deque()
         self._changed = threading.Condition()
         self._cancelled = False
 

@@ -9,15 +9,21 @@ and by nothing else, in whole ticks, so that the same bytes at the same ticks al
 answer.
 """
 
+from __future__ import annotations
+
 import math
 import random
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.bridge.messages import (
     BOARD, CONFIG, DISABLE, ENABLE, HELLO, Identity, NO, OK, SET, Telemetry, TELEMETRY, TIME_LIMIT,
     ZERO)
 from hysteresis_ros.bridge.protocol import (
-    BadLine, decimal, Decoder, encode, Frame, integer, SEQUENCE_LIMIT, VERSION)
+    BadLine, decimal, Decoder, encode, Fields, Frame, integer, SEQUENCE_LIMIT, VERSION)
 from hysteresis_ros.errors import ProtocolError
+
+if TYPE_CHECKING:
+    from hysteresis_ros.laboratory.arm import Arm
 
 TICK = 20                   # ms; dt of the arm and of the firmware's loop
 PERIOD = 100                # ms between two frames of telemetry, until `config` says otherwise
@@ -65,7 +71,8 @@ class SimulatedBoard:
 
     """
 
-    def __init__(self, arm, supply=12.0, seed=0, speed=1.0, brownout=math.inf):
+    def __init__(self, arm: Arm, supply: float = 12.0, seed: int = 0, speed: float = 1.0,
+                 brownout: float = math.inf) -> None:
         self.arm = arm
         self._nominal_supply = supply
         self._random = random.Random(seed)
@@ -78,13 +85,13 @@ class SimulatedBoard:
                           ENABLE: self._on_enable, DISABLE: self._on_disable, ZERO: self._on_zero}
         self.start()
 
-    def start(self):
+    def start(self) -> None:
         """Start the firmware anew, as after a loss of power."""
         self._boot += 1
         self.time = 0
         self.duty = 0.0
         self.enabled = False
-        self.faults = set()
+        self.faults: set[str] = set()
         self._decoder = Decoder()
         self._sequence = 0
         self._period = PERIOD
@@ -93,22 +100,22 @@ class SimulatedBoard:
         self._next_ambient = 0
         self._next_remark = 0
         self._last_set = 0
-        self._accepted = None
+        self._accepted: int | None = None
         self._counter_zero = self._last_counts = self.arm.encoder_counts
         if self._boot == 1:
             self._counter_zero = 0      # the encoder was set to zero when the arm was built
         self._index = 0
-        self._latch = None
+        self._latch: int | None = None
         self._remark(f'simulated PWM board, protocol {VERSION}; say "hello 1*'
                      + encode(HELLO, 1).decode('ascii').strip().partition('*')[2] + '"')
 
     @property
-    def supply(self):
+    def supply(self) -> float:
         """Supply voltage in V now."""
         low = 0.0 <= self._world_time - self._brownout < BROWNOUT_TIME
         return self._nominal_supply * (BROWNOUT_SUPPLY if low else 1.0)
 
-    def receive(self, data):
+    def receive(self, data: bytes) -> None:
         """
         Take bytes from the host.
 
@@ -124,7 +131,7 @@ class SimulatedBoard:
             elif isinstance(line, BadLine):
                 self._explain(line)
 
-    def transmit(self):
+    def transmit(self) -> bytes:
         """
         Give the bytes that go to the host.
 
@@ -138,7 +145,7 @@ class SimulatedBoard:
         self._outgoing.clear()
         return data
 
-    def advance(self, ticks=1):
+    def advance(self, ticks: int = 1) -> None:
         """
         Let time pass.
 
@@ -163,7 +170,7 @@ class SimulatedBoard:
                 self.next_telemetry += self._period
                 self._send_telemetry()
 
-    def idle(self, ticks):
+    def idle(self, ticks: int) -> None:
         """
         Let time pass for the arm while the board has no power.
 
@@ -177,14 +184,14 @@ class SimulatedBoard:
             self.arm.advance(TICK / 1000.0, 0.0)
             self._world_time += TICK
 
-    def _look_at_supply(self):
+    def _look_at_supply(self) -> None:
         if self.supply < LOWEST_SUPPLY:
             self.duty = 0.0
             self.faults.add('supply')
         else:
             self.faults.discard('supply')
 
-    def _count(self):
+    def _count(self) -> None:
         """Watch the encoder for its index pulse, as the counter's hardware does."""
         counts = self.arm.encoder_counts
         before = (self._last_counts - INDEX_COUNTS) // COUNTS_PER_REVOLUTION
@@ -195,7 +202,7 @@ class SimulatedBoard:
             self._latch = (max(now, before) * COUNTS_PER_REVOLUTION + INDEX_COUNTS
                            - self._counter_zero)
 
-    def _send_telemetry(self):
+    def _send_telemetry(self) -> None:
         ambient = None
         if self.time >= self._next_ambient:
             self._next_ambient = self.time + AMBIENT_PERIOD
@@ -206,14 +213,14 @@ class SimulatedBoard:
             enabled=self.enabled, faults=tuple(sorted(self.faults)), index=self._index,
             latch=self._latch, ambient=ambient, accepted=self._accepted).fields())
 
-    def _send(self, kind, fields):
+    def _send(self, kind: str, fields: Fields) -> None:
         self._outgoing += encode(kind, self._sequence, fields)
         self._sequence = (self._sequence + 1) % SEQUENCE_LIMIT
 
-    def _remark(self, text):
+    def _remark(self, text: str) -> None:
         self._outgoing += f'# {text}\n'.encode('ascii', 'backslashreplace')
 
-    def _explain(self, line):
+    def _explain(self, line: BadLine) -> None:
         """Tell a person what was wrong with a line; a broken cable must not flood the host."""
         if self.time < self._next_remark:
             return
@@ -221,7 +228,7 @@ class SimulatedBoard:
         hint = f'; its CRC would be *{line.checksum}' if line.checksum else ''
         self._remark(f'nothing done, {line.reason}{hint}: {line.text}')
 
-    def _obey(self, frame):
+    def _obey(self, frame: Frame) -> None:
         handler = self._handlers.get(frame.kind)
         try:
             refusal = handler(frame) if handler else 'unknown_command'
@@ -232,35 +239,36 @@ class SimulatedBoard:
         elif frame.kind not in (HELLO, SET):
             self._send(OK, {'re': frame.sequence})
 
-    def _on_hello(self, frame):
+    def _on_hello(self, frame: Frame) -> None:
         self._send(BOARD, Identity(VERSION, 'simulated', '1', self._boot,
                                    self.time % TIME_LIMIT, 32, self._speed).fields())
 
-    def _on_config(self, frame):
+    def _on_config(self, frame: Frame) -> str | None:
         period, watchdog = integer(frame, 'period'), integer(frame, 'watchdog')
         if period < 1 or watchdog < 1:
             return 'out_of_range'
         self._period = -(-period // TICK) * TICK
         self._watchdog = watchdog
         self.next_telemetry = self.time + self._period
+        return None
 
-    def _on_enable(self, frame):
+    def _on_enable(self, frame: Frame) -> None:
         if not self.enabled:
             self.duty = 0.0
             self.enabled = True
             self._last_set = self.time
 
-    def _on_disable(self, frame):
+    def _on_disable(self, frame: Frame) -> None:
         self.duty = 0.0
         self.enabled = False
         self.faults.discard('watchdog')
 
-    def _on_zero(self, frame):
+    def _on_zero(self, frame: Frame) -> None:
         self._counter_zero = self.arm.encoder_counts
         self._index = 0
         self._latch = None
 
-    def _on_set(self, frame):
+    def _on_set(self, frame: Frame) -> str | None:
         duty = decimal(frame, 'duty')
         if not 0.0 <= duty <= 1.0:
             return 'out_of_range'

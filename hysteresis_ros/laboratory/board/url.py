@@ -31,6 +31,7 @@ laboratory with its strength, such as ``supply_sag=0.4``.
 import dataclasses
 import math
 from urllib.parse import parse_qsl, urlsplit
+from typing import Any
 
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.hidden_physics import EFFECTS
@@ -94,7 +95,8 @@ def parse_url(url: str) -> Simulation:
     parts = urlsplit(url)
     if parts.scheme.lower() != SCHEME or parts.netloc.lower() != ARM or parts.path not in ('', '/'):
         raise ParameterError(f'port {url}: the simulated board is {SCHEME}://{ARM}')
-    values, effects = {}, {}
+    values: dict[str, Any] = {}
+    effects: dict[str, float] = {}
     for key, text in parse_qsl(parts.query, keep_blank_values=True):
         if key in values or key in effects:
             raise ParameterError(f'port {url}: {key} is given twice')
