@@ -7,14 +7,15 @@ from model_support import bicep_model, effect_of, ROWS, runs
 import numpy as np
 import pytest
 
-from hysteresis_ros.diagnosis import structure
-from hysteresis_ros.diagnosis.candidates import possible
+from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
-from hysteresis_ros.diagnosis.leftover import event_of, examine, flexible, lasting_step
+from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.problem import sensor_resolution
+from hysteresis_ros.diagnosis.residual import predictable, shares, unexplained_signal
+from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.significance import (
-    block_sums, cosines, family_p_values, flipped, gain_interval, held_out_errors,
-    paired_p_values, residualise, shifted)
+    block_sums, cosines, gain_interval, paired_p_values, residualise)
+from hysteresis_ros.diagnosis.verdict import add_signatures, in_order, next_experiment
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement
 
@@ -24,52 +25,6 @@ def problem():
     """Return rows of a model without any error."""
     model = bicep_model()
     return problem_for(model, [runs(model)])
-
-
-def test_held_out_errors_are_those_of_numpy_fold_by_fold():
-    """Each fold is predicted by least squares on the others."""
-    rng = np.random.default_rng(1)
-    columns, fold = rng.standard_normal((40, 3)), np.arange(40) // 10
-    targets = columns @ rng.standard_normal((3, 5)) + rng.standard_normal((40, 5))
-    expected = np.zeros(5)
-    for number in range(4):
-        test = fold == number
-        weights = np.linalg.lstsq(columns[~test], targets[~test], rcond=None)[0]
-        expected += np.sum((targets[test] - columns[test] @ weights) ** 2, axis=0)
-    assert held_out_errors(columns, targets.T, fold) == pytest.approx(expected / 40, rel=1e-6)
-    nothing = held_out_errors(np.zeros((40, 0)), targets.T, fold)
-    assert nothing == pytest.approx(np.mean(targets ** 2, axis=0))
-
-
-def test_family_p_values_count_the_best_of_all_candidates():
-    """A gain has to beat the best of the family in a draw, not its own chance."""
-    chance = np.array([[1.0, 2.0, 3.0, 0.0], [4.0, 0.0, 0.0, 0.5]])
-    values = family_p_values(np.array([2.5, 5.0, 0.1]), chance)
-    assert values == pytest.approx([3 / 5, 1 / 5, 1.0])
-
-
-def test_flipped_residuals_keep_size_and_blocks():
-    """Only the signs change, and those of a block together."""
-    residual, block = np.arange(1.0, 13.0), np.arange(12) // 3
-    draws = flipped(residual, block, np.random.default_rng(0), 50)
-    assert draws.shape == (50, 12)
-    signs = draws / residual
-    assert set(np.unique(signs)) == {-1.0, 1.0}
-    assert np.all(signs.reshape(50, 4, 3) == signs.reshape(50, 4, 3)[:, :, :1])
-
-
-def test_shifted_residuals_keep_their_order_and_stand_elsewhere():
-    """A row follows the same one as before, but for its sign, and never stands in its place."""
-    residual, block = np.arange(1.0, 13.0), np.arange(12) // 3
-    draws = shifted(residual, block, np.random.default_rng(0), 50)
-    assert draws.shape == (50, 12)
-    sizes = np.abs(draws)
-    assert np.all(np.diff(sizes, axis=1) % 12.0 == 1.0)
-    assert np.all(sizes != residual) and len(np.unique(sizes[:, 0])) > 5
-    signs = np.sign(draws).reshape(50, 4, 3)
-    assert np.all(signs == signs[:, :, :1]) and set(np.unique(signs)) == {-1.0, 1.0}
-    alone = shifted(np.ones(1), np.zeros(1, dtype=int), np.random.default_rng(0), 5)
-    assert np.all(np.abs(alone) == 1.0)
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():
@@ -103,41 +58,6 @@ def test_cosines_and_what_is_left_beside_columns():
     assert left[2] == pytest.approx([0.0, 0.0, 0.0])
     assert left[0] == pytest.approx([0.5, -0.5, 0.0])
     assert residualise(np.zeros((3, 0)), vectors) is vectors
-
-
-@given(st.integers(30, 170), st.sampled_from([-1.0, 1.0]))
-def test_a_planted_step_is_found_at_its_row(row, sign):
-    """Something that slips once leaves a step."""
-    noise = 0.1 * np.random.default_rng(row).standard_normal(200)
-    found, share = lasting_step(noise + sign * (np.arange(200) >= row))
-    assert abs(found - row) <= 1
-    assert share > 0.8
-
-
-def test_noise_has_no_step_and_few_rows_none_at_all():
-    """The best split of white noise explains next to nothing."""
-    assert lasting_step(np.random.default_rng(5).standard_normal(400))[1] < 0.05
-    assert lasting_step(np.array([0.0, 0.0, 1.0, 1.0])) == (0, 0.0)
-
-
-def test_a_drift_is_no_event():
-    """It, too, is higher at its end than at its start, but not at once."""
-    rng = np.random.default_rng(8)
-    drift = np.linspace(-1.0, 1.0, 300) + 0.1 * rng.standard_normal(300)
-    assert lasting_step(drift)[1] == 0.0
-    shape = 1.0 + np.cos(0.3 * np.arange(300))
-    assert lasting_step(shape * np.linspace(0.0, 1.0, 300), shape)[1] == 0.0
-
-
-def test_a_step_of_the_length_shows_in_proportion_to_the_sensitivity(problem):
-    """A crimp that slips moves the arm more where the arm answers more."""
-    rows = len(problem.measured)
-    sensitivity = 60.0 + 50.0 * np.sin(0.7 * np.arange(rows))
-    residual = 1e-3 * sensitivity * (np.arange(rows) >= 100)
-    time, share = event_of(problem, residual, sensitivity)
-    assert time == problem.clock[100] and share == pytest.approx(1.0)
-    assert event_of(problem, residual)[1] < 0.8
-    assert event_of(problem, np.zeros(rows)) == (None, 0.0)
 
 
 def test_effects_that_the_bench_has_shown_may_differ_on_the_arm():
