@@ -57,8 +57,8 @@ def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
     """
     problem = problem_for(model, measurements, effects, jobs)
     if len(problem.measured) < FEWEST_ROWS:
-        raise MeasurementError(f'the recording has {len(problem.measured)} rows, and a diagnosis '
-                               f'needs at least {FEWEST_ROWS}; record more, or give several files')
+        raise MeasurementError(f'a diagnosis needs at least {FEWEST_ROWS} rows, and the recordings '
+                               f'have {len(problem.measured)}; record more, or give more files')
     rng = np.random.default_rng(seed)
     if problem.refits:
         return bench_verdict(problem, settings, rng, jobs, progress)
