@@ -7,7 +7,7 @@ import pytest
 
 from hysteresis_ros.identification.bouc_wen import (
     fit_bouc_wen, HIGHEST, LOWEST, PIECES, starts)
-from hysteresis_ros.laboratory.protocols import bench_tables
+from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.operators import BoucWen, Linear
 

@@ -2,27 +2,54 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits of effects to measured rows: their parameters, their starts, and what is held out."""
 
-import dataclasses
-from types import SimpleNamespace
-
 from hypothesis import given, strategies as st
 from model_support import bicep_model, effect_of, runs, STRENGTHS
 import numpy as np
 import pytest
 
-from hysteresis_ros.diagnosis.candidates import begin, consider, finish
-from hysteresis_ros.diagnosis.derivatives import Derivatives
-from hysteresis_ros.diagnosis.fit import Fitter
+from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
+from hysteresis_ros.diagnosis.covariance import Covariance
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of, usual
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.measurements import Measurement
+
+# Root mean square of the discrepancy that the fits below expect [rad], and noise of the sensor.
+SIZE, NOISE = 0.01, 1e-3
+
+
+def fitter_of(model, measured, jobs=1):
+    """Return a fitter on a recording, under a smooth discrepancy and noise."""
+    problem = problem_for(model, [measured], jobs=jobs)
+    drive = problem.signals['drive'] / 6.0
+    discrepancy = SIZE ** 2 * np.exp(-0.5 * ((drive[:, None] - drive[None, :]) / 0.45) ** 2)
+    covariance = Covariance(discrepancy, problem.clock, problem.trial, NOISE, 0.3)
+    covariance.add(covariance.start(0.1, 0.3))
+    return Fitter(problem, covariance)
+
+
+def noisy(model, effects=(), seed=3, **how):
+    """Return an arm run of the model with effects, with white noise on its angle."""
+    clean = runs(model.with_effects([*model.effects, *effects]), rows=40, **how)
+    noise = NOISE * np.random.default_rng(seed).standard_normal(clean.rows)
+    return Measurement.from_columns({**clean.columns, 'angle': clean.column('angle') + noise})
+
+
+def neutral(fitter, name):
+    """Return an effect at the value in the middle of its starts."""
+    return usual([catalogue()[name](fitter.problem.model.surroundings)], 'arm')[0]
 
 
 @pytest.fixture(scope='module')
-def problem():
-    """Return rows of a model without any error."""
-    model = bicep_model()
-    return problem_for(model, [runs(model)])
+def model():
+    """Return the model without effects."""
+    return bicep_model()
+
+
+@pytest.fixture(scope='module')
+def loaded(model):
+    """Return a fitter on a run of the arm with 15 g too much."""
+    return fitter_of(model, noisy(model, [effect_of(model, 'payload_error', dm=15.0)]))
 
 
 @pytest.mark.parametrize('name', sorted(STRENGTHS))
@@ -84,112 +111,197 @@ def test_fits_start_from_different_plausible_values(name):
         assert not any(start.implausible() for start in starts)
 
 
+@pytest.mark.parametrize('name', sorted(STRENGTHS))
+def test_the_plausible_range_is_the_middle_of_the_prior(name):
+    """One and a half standard deviations to each side; signed ones are as often negative."""
+    effect = effect_of(bicep_model(), name)
+    parameters = ParameterVector([effect], 'arm')
+    mean, spread = parameters.prior()
+    assert np.all(spread > 0.0)
+    for index, (_, parameter) in enumerate(parameters.entries):
+        ends = []
+        for side in (-1.5, 1.5):
+            vector = parameters.vector()
+            vector[index] = mean[index] + side * spread[index]
+            ends.append(parameters.with_vector(vector)[0].values[parameter.name])
+        low = -parameter.high if parameter.both_signs else parameter.low
+        expected = np.clip([low, parameter.high], *parameter.bounds)
+        assert ends == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_the_fit_finds_a_planted_payload(loaded):
+    """With its interval, and on the rows that were held out."""
+    fit, = loaded.fit([[neutral(loaded, 'payload_error')]], loaded.covariance.points[0])
+    found, = loaded.with_intervals(fit)
+    assert found.values['dm'] == pytest.approx(15.0, abs=1.0)
+    low, high = found.intervals['dm']
+    assert low < 15.0 < high and high - low < 6.0
+    assert fit.implausible() == []
+    checked, = loaded.cross_validate([fit])
+    assert loaded.error(checked.held_out) < 2.0 * NOISE
+    assert loaded.error(loaded.simulate([[]])[0]) > 0.02
+
+
+def test_a_fit_is_the_maximum_of_the_posterior(loaded):
+    """A little to either side the whitened residuals and the prior cost more."""
+    point = loaded.covariance.points[0]
+    fit, = loaded.fit([[neutral(loaded, name) for name in ('payload_error', 'supply_sag')]], point)
+    parameters = ParameterVector(fit.effects, 'arm')
+    mean, spread = parameters.prior()
+
+    def cost(vector):
+        predicted, = loaded.simulate([parameters.with_vector(vector)])
+        whitened = point.whiten(loaded.problem.measured - predicted)
+        return whitened @ whitened + np.sum(((vector - mean) / spread) ** 2)
+
+    best = cost(fit.vector)
+    deviation = np.sqrt(np.diag(fit.spread))
+    for index in range(len(fit.vector)):
+        for side in (-1.0, 1.0):
+            moved = fit.vector.copy()
+            moved[index] += side * deviation[index]
+            assert cost(np.clip(moved, parameters.lower, parameters.upper)) > best
+
+
+def test_several_sets_in_one_batch_are_fitted_as_each_by_itself(loaded):
+    """All advance together; none knows of the others."""
+    sets = [[neutral(loaded, name) for name in names] for names in (
+        ('payload_error',), ('encoder_offset', 'supply_sag'), ('frame_tilt',))]
+    point = loaded.covariance.points[0]
+    together = loaded.fit(sets, point)
+    assert [fit.names for fit in together] == [
+        ('payload_error',), ('encoder_offset', 'supply_sag'), ('frame_tilt',)]
+    for fit, effects in zip(together, sets):
+        alone, = loaded.fit([effects], point)
+        assert fit.vector == pytest.approx(alone.vector, abs=1e-9)
+        assert fit.log_evidence == pytest.approx(alone.log_evidence, abs=1e-6)
+        assert fit.predicted == pytest.approx(alone.predicted, abs=1e-9)
+
+
+def test_fits_are_the_same_whatever_the_jobs(model):
+    """Threads share the simulations and nothing else."""
+    measured = noisy(model, [effect_of(model, 'payload_error', dm=15.0)])
+    vectors = []
+    for jobs in (1, 2):
+        fitter = fitter_of(model, measured, jobs)
+        vectors.append([fit.vector for fit in fitter.fit(
+            [[neutral(fitter, name)] for name in ('payload_error', 'supply_sag')],
+            fitter.covariance.points[0])])
+    for one, two in zip(*vectors):
+        assert np.array_equal(one, two)
+
+
+def test_no_effects_are_a_fit_too(loaded):
+    """The base model, with an evidence that the planted effect exceeds by far."""
+    point = loaded.covariance.points[0]
+    base, = loaded.fit([[]], point)
+    planted, = loaded.fit([[neutral(loaded, 'payload_error')]], point)
+    assert base.vector.shape == (0,) and base.names == ()
+    assert np.array_equal(base.predicted, loaded.simulate([[]])[0])
+    assert planted.log_evidence > base.log_evidence + 20.0
+
+
+def test_a_start_without_any_effect_has_no_better_evidence_than_the_base(loaded):
+    """A stop out of reach changes nothing, and its prior has to be paid for."""
+    highest = float(np.max(loaded.problem.measured))
+    stop = neutral(loaded, 'end_stop').with_values(stop=min(highest + 0.8, 3.1), side=1.0)
+    point = loaded.covariance.points[0]
+    base, = loaded.fit([[]], point)
+    fit, = loaded.fit([[stop]], point)
+    assert fit.predicted == pytest.approx(base.predicted, abs=1e-9)
+    assert np.all(np.isfinite(fit.spread)) and np.isfinite(fit.log_evidence)
+    assert fit.log_evidence <= base.log_evidence + 1e-6
+
+
+def test_a_set_whose_simulation_fails_is_left_out(loaded, monkeypatch):
+    """The others of the batch are fitted as if it were not there."""
+    simulate = loaded.problem.simulate_many
+
+    def failing(sets):
+        responses = simulate(sets)
+        for response, effects in zip(responses, sets):
+            if any(effect.id == 'frame_tilt' for effect in effects):
+                response[:] = np.nan
+        return responses
+    monkeypatch.setattr(loaded.problem, 'simulate_many', failing)
+    fits = loaded.fit([[neutral(loaded, 'frame_tilt')], [neutral(loaded, 'payload_error')]],
+                      loaded.covariance.points[0])
+    assert [fit.names for fit in fits] == [('payload_error',)]
+
+
+@pytest.mark.parametrize('noise', [1e-3, 1e-2])
+def test_intervals_hold_the_truth_about_as_often_as_they_say(model, noise):
+    """Of 40 draws of noise and discrepancy at least 33, and they are no wider than needed."""
+    truth = effect_of(model, 'payload_error', dm=15.0)
+    fitter = fitter_of(model, noisy(model, [truth]))
+    clean = fitter.simulate([[truth]])[0]
+    values = fitter.covariance.start(0.1)
+    values[3] = np.log(noise)
+    point = fitter.covariance.point(values)
+    fitter.covariance.points[:] = [point]
+    rng, held, away, widths = np.random.default_rng(6), 0, [], []
+    for _ in range(40):
+        fitter.problem.measured = clean + point.factor @ rng.standard_normal(len(clean))
+        fit, = fitter.fit([[truth]], point)
+        found, = fitter.with_intervals(fit)
+        low, high = found.intervals['dm']
+        held += low <= 15.0 <= high
+        away.append(found.values['dm'] - 15.0)
+        widths.append(high - low)
+    assert held >= 33, held
+    assert np.median(widths) < 2.0 * 1.96 * 1.8 * np.std(away)
+
+
+def test_the_evidence_under_the_covariance_of_the_residuals_is_the_larger_one(loaded):
+    """Noise and drift are estimated from what a fit leaves, which no evidence makes smaller."""
+    fit, = loaded.fit([[neutral(loaded, 'supply_sag')]], loaded.covariance.points[0])
+    kept = list(loaded.covariance.points)
+    try:
+        refined = loaded.refined(fit)
+        assert len(loaded.covariance.points) == len(kept) + 1
+    finally:
+        loaded.covariance.points[:] = kept
+    assert refined.log_evidence > fit.log_evidence
+
+
+def test_a_fold_is_predicted_by_a_step_no_longer_than_it_helps(loaded):
+    """A straight line leads astray where the response bends."""
+    fit, = loaded.fit([[neutral(loaded, 'payload_error')]], loaded.covariance.points[0], steps=0)
+    # Far from the minimum, with derivatives that are four times too small.
+    wrong = Fit(fit.effects, fit.vector, fit.predicted, 0.25 * fit.jacobian)
+    checked, = loaded.cross_validate([wrong])
+    problem = loaded.problem
+    assert loaded.error(checked.held_out) < loaded.error(fit.predicted)
+    for fold in problem.folds:
+        rows = problem.fold == fold
+        assert np.mean((problem.measured - checked.held_out)[rows] ** 2) <= 1.01 * np.mean(
+            (problem.measured - fit.predicted)[rows] ** 2)
+
+
+def test_the_rows_of_a_fold_do_not_help_to_predict_themselves(model, loaded):
+    """Another angle in one trial changes what is foretold of the others only."""
+    fit, = loaded.fit([[neutral(loaded, 'payload_error')]], loaded.covariance.points[0])
+    problem = loaded.problem
+    measured, rows = problem.measured, problem.fold == problem.folds[0]
+    before, = loaded.cross_validate([fit])
+    try:
+        problem.measured = measured + 0.02 * rows
+        after, = loaded.cross_validate([fit])
+    finally:
+        problem.measured = measured
+    assert np.array_equal(before.held_out[rows], after.held_out[rows])
+    assert not np.array_equal(before.held_out[~rows], after.held_out[~rows])
+
+
 def test_another_compliance_than_on_the_bench_takes_the_place_of_the_first():
     """It is fitted anew, from what the bench has found; both together would count it twice."""
     model = bicep_model(['series_compliance'])
-    other = model.with_effects([effect_of(model, 'series_compliance', compliance=0.25)])
-    recorded = runs(other)
-    problem = problem_for(model, [recorded])
-    fitter = Fitter(problem)
-    base = fitter.cross_validate(model.effects, fitter.fit(model.effects, []))
-    found = consider(fitter, base, 'series_compliance')
-    assert found.effect.values['compliance'] == pytest.approx(0.25, rel=0.02)
-    assert found.rmse < 0.05 * fitter.error(base.held_out)
-
-
-def test_the_fit_finds_a_planted_payload(problem):
-    """With its interval, and on the rows that were held out."""
-    truth = effect_of(problem.model, 'payload_error', dm=15.0)
-    data = runs(problem.model.with_effects([truth]))
-    fitter = Fitter(problem_for(problem.model, [data]))
-    effect = catalogue()['payload_error'](problem.model.surroundings)
-    fit = fitter.cross_validate([], fitter.search([], [], effect))
-    found, = fitter.with_intervals(fit)
-    assert found.values['dm'] == pytest.approx(15.0, abs=0.05)
-    low, high = found.intervals['dm']
-    assert low <= found.values['dm'] <= high
-    assert fitter.error(fit.held_out) < 1e-3
-    assert fitter.error(fitter.problem.simulate([])) > 0.02
-    assert fit.implausible() == []
-
-
-def test_a_fold_is_predicted_by_a_step_no_longer_than_it_helps(problem):
-    """A straight line leads astray where the response bends."""
-    fitter = Fitter(problem)
-    payload = effect_of(problem.model, 'payload_error', dm=15.0)
-    fit = fitter.fit([], [payload], evaluations=1)
-    # Far from the minimum, with derivatives that are four times too small: a step of 1 at most.
-    fit = dataclasses.replace(fit, jacobian=0.25 * fit.jacobian)
-    held_out = fitter.cross_validate([], fit).held_out
-    for fold in problem.folds:
-        train = problem.fold != fold
-        step = fitter._stepped([], fit, ParameterVector(fit.effects, 'arm'), train)
-        assert fitter.error(step, train) <= fitter.error(fit.predicted, train)
-        assert np.array_equal(step[~train], held_out[~train])
-
-
-def test_what_promises_nothing_is_not_fitted_to_the_end(problem, monkeypatch):
-    """A few steps, and no simulation of its folds: a straight line says as much."""
-    fitter = Fitter(problem)
-    monkeypatch.setattr(problem, 'measured', problem.measured + 0.05 * np.cos(problem.measured))
-    begun = begin(fitter, [], [effect_of(problem.model, 'payload_error', dm=15.0)])
-    error = fitter.error(begun.predicted)
-    assert fitter.promises(begun, 1.03 * error) and not fitter.promises(begun, 1.01 * error)
-    simulated = []
-    simulate = problem.simulate
-    monkeypatch.setattr(problem, 'simulate',
-                        lambda *args: simulated.append(1) or simulate(*args))
-    nothing = dataclasses.replace(begun, converged=False)
-    current = dataclasses.replace(begun, held_out=begun.predicted)
-    found = finish(fitter, current, nothing)
-    assert not simulated
-    assert found.rmse == pytest.approx(error, rel=0.2)
-    current.predicted = np.zeros(len(problem.measured))
-    finish(fitter, current, nothing)
-    assert simulated
-
-
-@pytest.mark.parametrize('bend', [0.0, 0.02, 30.0])
-def test_derivatives_follow_a_step_that_they_have_foretold(bend):
-    """Broyden's update costs no simulation; a step that surprises asks for differences again."""
-    matrix = np.array([[1.0, 2.0], [0.5, -1.0], [0.2, 0.1]])
-    asked = []
-
-    def response(vector):
-        asked.append(1)
-        return matrix @ vector + bend * vector[0] ** 2
-
-    derivatives = Derivatives(response, np.full(2, 10.0))
-    first, second = np.array([0.0, 1.0]), np.array([0.4, 1.3])
-    begun = derivatives.at(first)
-    assert not derivatives.rough and begun == pytest.approx(matrix, abs=0.03 * bend + 1e-9)
-    del asked[:]
-    found = derivatives.at(second)
-    assert derivatives.rough == (bend < 1.0)
-    # The response at both ends of the step, which a fit has anyhow, and two differences.
-    assert len(asked) == (2 if bend < 1.0 else 5)
-    if bend < 1.0:
-        # Broyden: right along the step, unchanged across it.
-        across = np.array([-0.3, 0.4])
-        assert found @ (second - first) == pytest.approx(response(second) - response(first))
-        assert found @ across == pytest.approx(begun @ across)
-    assert derivatives.at(second) is found
-
-
-def test_a_fit_that_goes_on_does_not_simulate_again_what_it_knows(problem, monkeypatch):
-    """Where it was, and the derivatives there; what is cross-validated has exact ones."""
-    fitter = Fitter(problem)
-    effects = [effect_of(problem.model, 'payload_error', dm=15.0)]
-    begun = fitter.fit([], effects, evaluations=1)
-    asked = []
-    simulate = problem.simulate
-    monkeypatch.setattr(problem, 'simulate',
-                        lambda *args: asked.append(1) or simulate(*args))
-    on = fitter.fit([], begun.effects, evaluations=1, begun=begun)
-    assert not asked and on.vector == pytest.approx(begun.vector)
-    rough = dataclasses.replace(begun, jacobian=1.1 * begun.jacobian, rough=True)
-    exact = fitter.cross_validate([], rough)
-    assert exact.jacobian == pytest.approx(begun.jacobian) and not exact.rough
+    other = effect_of(model, 'series_compliance', compliance=0.25)
+    clean = runs(model.with_effects([other]), rows=40)
+    fitter = fitter_of(model, clean)
+    fit, = fitter.fit([list(model.effects)], fitter.covariance.points[0])
+    assert fit.effects[0].values['compliance'] == pytest.approx(0.25, rel=0.1)
+    assert fitter.error(fit.predicted) < 0.1 * fitter.error(fitter.simulate([[]])[0])
 
 
 def test_usual_values_keep_what_is_chosen_and_not_fitted():
@@ -200,40 +312,3 @@ def test_usual_values_keep_what_is_chosen_and_not_fitted():
     assert payload.values['dm'] in {start.values['dm'] for start in starts_of(payload, 'arm')}
     assert payload.values['dm'] != 44.0
     assert creep.values['kept'] == 1.0 and creep.values['t0'] == 3.0
-
-
-@pytest.mark.parametrize('names, count', [(['payload_error', 'supply_sag'], 2),
-                                          (['viscous_friction', 'supply_sag'], 1),
-                                          (['supply_sag'], 1)])
-def test_beside_others_a_fit_begins_from_usual_values_too(problem, monkeypatch, names, count):
-    """But where a simulation takes long; by itself an effect has no other's values to hold it."""
-    fitter = Fitter(problem)
-    *known, new = [effect_of(problem.model, name) for name in names]
-    begun = []
-    fit = fitter.fit
-
-    def counting(fixed, effects, *rest, **options):
-        begun.append([effect.values for effect in effects])
-        return fit(fixed, effects, *rest, **options)
-    monkeypatch.setattr(fitter, 'fit', counting)
-    begin(fitter, known, [new])
-    assert len(begun) == count and begun[0] == [effect.values for effect in (*known, new)]
-    if count > 1:
-        assert begun[1] == [effect.values for effect in usual([*known, new], 'arm')]
-
-
-def test_of_starts_without_any_effect_one_is_tried(problem, monkeypatch):
-    """A stop is looked for where the response ends, though stops out of reach fit better."""
-    monkeypatch.setattr(problem, 'measured', problem.measured + 0.01)
-    fitter = Fitter(problem)
-    followed = []
-    monkeypatch.setattr(fitter, 'fit', lambda fixed, effects, **options: followed.append(
-        effects[-1].values) or SimpleNamespace(predicted=problem.measured))
-    starts = fitter.starts([], effect_of(problem.model, 'end_stop'))
-    highest, lowest = np.max(problem.measured), np.min(problem.measured)
-    assert [start.values['stop'] for start in starts[-2:]] == [highest, lowest]
-    out_of_reach = [start for start in starts if start.side * (
-        start.stop - (highest if start.side > 0 else lowest)) > 0.05]
-    near = starts[-2].with_values(stop=highest - 0.015)
-    fitter.begin([], [], [*out_of_reach, *out_of_reach, near])
-    assert len(followed) == 2 and near.values in followed

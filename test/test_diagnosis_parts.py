@@ -2,19 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """The statistics and the bookkeeping that a diagnosis is made of, each against its definition."""
 
-from hypothesis import given, strategies as st
-from model_support import bicep_model, effect_of, ROWS, runs
+import dataclasses
+
+from model_support import arm_run, bicep_model, GEOMETRY, ROWS, runs
 import numpy as np
 import pytest
 
-from hysteresis_ros.diagnosis import structure
-from hysteresis_ros.diagnosis.candidates import possible
+from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
-from hysteresis_ros.diagnosis.leftover import event_of, examine, flexible, lasting_step
+from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.problem import sensor_resolution
+from hysteresis_ros.diagnosis.residual import predictable, shares, unexplained_signal
+from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.significance import (
-    block_sums, cosines, family_p_values, flipped, gain_interval, held_out_errors,
-    paired_p_values, residualise, shifted)
+    block_sums, cosines, gain_interval, paired_p_values, residualise)
+from hysteresis_ros.diagnosis.verdict import add_signatures, in_order, next_experiment
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement
 
@@ -24,52 +26,6 @@ def problem():
     """Return rows of a model without any error."""
     model = bicep_model()
     return problem_for(model, [runs(model)])
-
-
-def test_held_out_errors_are_those_of_numpy_fold_by_fold():
-    """Each fold is predicted by least squares on the others."""
-    rng = np.random.default_rng(1)
-    columns, fold = rng.standard_normal((40, 3)), np.arange(40) // 10
-    targets = columns @ rng.standard_normal((3, 5)) + rng.standard_normal((40, 5))
-    expected = np.zeros(5)
-    for number in range(4):
-        test = fold == number
-        weights = np.linalg.lstsq(columns[~test], targets[~test], rcond=None)[0]
-        expected += np.sum((targets[test] - columns[test] @ weights) ** 2, axis=0)
-    assert held_out_errors(columns, targets.T, fold) == pytest.approx(expected / 40, rel=1e-6)
-    nothing = held_out_errors(np.zeros((40, 0)), targets.T, fold)
-    assert nothing == pytest.approx(np.mean(targets ** 2, axis=0))
-
-
-def test_family_p_values_count_the_best_of_all_candidates():
-    """A gain has to beat the best of the family in a draw, not its own chance."""
-    chance = np.array([[1.0, 2.0, 3.0, 0.0], [4.0, 0.0, 0.0, 0.5]])
-    values = family_p_values(np.array([2.5, 5.0, 0.1]), chance)
-    assert values == pytest.approx([3 / 5, 1 / 5, 1.0])
-
-
-def test_flipped_residuals_keep_size_and_blocks():
-    """Only the signs change, and those of a block together."""
-    residual, block = np.arange(1.0, 13.0), np.arange(12) // 3
-    draws = flipped(residual, block, np.random.default_rng(0), 50)
-    assert draws.shape == (50, 12)
-    signs = draws / residual
-    assert set(np.unique(signs)) == {-1.0, 1.0}
-    assert np.all(signs.reshape(50, 4, 3) == signs.reshape(50, 4, 3)[:, :, :1])
-
-
-def test_shifted_residuals_keep_their_order_and_stand_elsewhere():
-    """A row follows the same one as before, but for its sign, and never stands in its place."""
-    residual, block = np.arange(1.0, 13.0), np.arange(12) // 3
-    draws = shifted(residual, block, np.random.default_rng(0), 50)
-    assert draws.shape == (50, 12)
-    sizes = np.abs(draws)
-    assert np.all(np.diff(sizes, axis=1) % 12.0 == 1.0)
-    assert np.all(sizes != residual) and len(np.unique(sizes[:, 0])) > 5
-    signs = np.sign(draws).reshape(50, 4, 3)
-    assert np.all(signs == signs[:, :, :1]) and set(np.unique(signs)) == {-1.0, 1.0}
-    alone = shifted(np.ones(1), np.zeros(1, dtype=int), np.random.default_rng(0), 5)
-    assert np.all(np.abs(alone) == 1.0)
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():
@@ -105,51 +61,24 @@ def test_cosines_and_what_is_left_beside_columns():
     assert residualise(np.zeros((3, 0)), vectors) is vectors
 
 
-@given(st.integers(30, 170), st.sampled_from([-1.0, 1.0]))
-def test_a_planted_step_is_found_at_its_row(row, sign):
-    """Something that slips once leaves a step."""
-    noise = 0.1 * np.random.default_rng(row).standard_normal(200)
-    found, share = lasting_step(noise + sign * (np.arange(200) >= row))
-    assert abs(found - row) <= 1
-    assert share > 0.8
-
-
-def test_noise_has_no_step_and_few_rows_none_at_all():
-    """The best split of white noise explains next to nothing."""
-    assert lasting_step(np.random.default_rng(5).standard_normal(400))[1] < 0.05
-    assert lasting_step(np.array([0.0, 0.0, 1.0, 1.0])) == (0, 0.0)
-
-
-def test_a_drift_is_no_event():
-    """It, too, is higher at its end than at its start, but not at once."""
-    rng = np.random.default_rng(8)
-    drift = np.linspace(-1.0, 1.0, 300) + 0.1 * rng.standard_normal(300)
-    assert lasting_step(drift)[1] == 0.0
-    shape = 1.0 + np.cos(0.3 * np.arange(300))
-    assert lasting_step(shape * np.linspace(0.0, 1.0, 300), shape)[1] == 0.0
-
-
-def test_a_step_of_the_length_shows_in_proportion_to_the_sensitivity(problem):
-    """A crimp that slips moves the arm more where the arm answers more."""
-    rows = len(problem.measured)
-    sensitivity = 60.0 + 50.0 * np.sin(0.7 * np.arange(rows))
-    residual = 1e-3 * sensitivity * (np.arange(rows) >= 100)
-    time, share = event_of(problem, residual, sensitivity)
-    assert time == problem.clock[100] and share == pytest.approx(1.0)
-    assert event_of(problem, residual)[1] < 0.8
-    assert event_of(problem, np.zeros(rows)) == (None, 0.0)
-
-
 def test_effects_that_the_bench_has_shown_may_differ_on_the_arm():
     """Those of the wire are tried again, those of the arm are not."""
-    model = bicep_model(['series_compliance', 'payload_error', 'heating_cooling_asymmetry'])
-    names, _ = possible(problem_for(model, [runs(model, step=0.1)]), [])
-    assert 'series_compliance' in names
-    assert 'payload_error' not in names
-    # A lag is a part of the asymmetry, so it cannot be missing beside it.
-    effect = effect_of(model, 'heating_cooling_asymmetry')
-    names, _ = possible(problem_for(bicep_model(), [runs(model, step=0.1)]), [effect])
-    assert not {'thermal_lag', 'heating_cooling_asymmetry'} & set(names)
+    model = bicep_model(['series_compliance', 'payload_error'])
+    names, unobservable = observable(problem_for(model, [runs(model, step=0.1)]))
+    assert 'series_compliance' in names and 'encoder_offset' in names
+    assert 'payload_error' not in {*names, *unobservable}
+
+
+def test_what_needs_transients_is_unobservable_in_settled_rows(problem):
+    """With the reason; and what was not asked for is not mentioned."""
+    names, unobservable = observable(problem)
+    assert unobservable['thermal_lag'] == 'every row is settled'
+    assert 'was not recorded' in unobservable['ambient_temperature']
+    assert not set(names) & set(unobservable)
+    few = problem_for(problem.model, problem.measurements, ['thermal_lag', 'payload_error'])
+    assert observable(few) == (['payload_error'], {'thermal_lag': 'every row is settled'})
+    moving = problem_for(problem.model, [runs(problem.model, step=0.1)])
+    assert 'thermal_lag' in observable(moving)[0]
 
 
 def test_a_flexible_regression_finds_smooth_dependence_and_leaves_noise():
@@ -159,29 +88,20 @@ def test_a_flexible_regression_finds_smooth_dependence_and_leaves_noise():
     fold, noise = np.arange(400) // 50 % 4, rng.standard_normal(400)
     planted = 3.0 * np.sin(signals['drive'])
     truth = np.var(planted) / np.var(planted + noise)
-    assert flexible(signals, planted + noise, fold) == pytest.approx(truth, abs=0.12)
-    assert flexible(signals, noise, fold) < 0.03
-    assert flexible({}, noise, fold) == 0.0
+    assert predictable(signals, planted + noise, fold) == pytest.approx(truth, abs=0.12)
+    assert predictable(signals, noise, fold) < 0.03
+    assert predictable({}, noise, fold) == 0.0
 
 
-def test_what_is_left_names_the_signal_in_which_it_shows(problem):
-    """A residual that follows the drive says drive, and white noise says nothing."""
+def test_a_residual_names_the_signal_in_which_it_shows(problem):
+    """One that follows the drive says drive, and white noise says nothing."""
     drive = problem.signals['drive']
-    left = examine(problem, np.cos(0.5 * drive))
-    assert left.explained > 0.8 and left.signal == 'drive'
-    noise = examine(problem, np.random.default_rng(7).standard_normal(len(drive)))
-    assert noise.explained < 0.1 and noise.signal == ''
-
-
-def test_an_event_has_the_time_since_the_recording_began():
-    """Trials follow each other, and the clock runs on."""
-    model = bicep_model()
-    problem = problem_for(model, [runs(model)])
-    row = 2 * ROWS - 20
-    left = examine(problem, (np.arange(3 * ROWS) >= row).astype(float))
-    assert left.event_share > 0.99
-    assert left.event == problem.clock[row]
-    assert np.all(np.diff(problem.clock) > 0.0)
+    residual = np.cos(0.5 * drive)
+    assert unexplained_signal(problem, residual) == 'drive'
+    assert shares(problem, residual)['all'] > 0.8
+    noise = np.random.default_rng(7).standard_normal(len(drive))
+    assert unexplained_signal(problem, noise) == ''
+    assert max(shares(problem, noise).values()) < 0.1
 
 
 def test_one_signal_alone_may_show_what_all_together_do_not():
@@ -190,28 +110,50 @@ def test_one_signal_alone_may_show_what_all_together_do_not():
     problem = problem_for(model, [runs(model, sizes=[20, 20, 20])])
     rng = np.random.default_rng(9)
     problem.signals.update({f'noise{n}': rng.standard_normal(60) for n in range(12)})
-    drive = problem.signals['drive']
-    left = examine(problem, np.sin(drive) + 0.2 * rng.standard_normal(60))
-    assert left.signal == 'drive' and left.explained > 0.5
+    residual = np.sin(problem.signals['drive']) + 0.2 * rng.standard_normal(60)
+    assert unexplained_signal(problem, residual) == 'drive'
+    found = shares(problem, residual)
+    assert found['drive'] > 0.5 and found['drive'] > found['all']
 
 
-def test_decoys_have_the_size_that_the_bench_found_and_the_noise(problem):
-    """In the angle they are the error of the length times the arm's sensitivity."""
-    model = problem.model
-    assert structure.length_error(model) == 0.0004
-    rng = np.random.default_rng(8)
+def test_the_clock_runs_on_over_trials_and_recordings():
+    """An event has one time, whatever the files are divided into."""
+    model = bicep_model()
+    problem = problem_for(model, [runs(model, 2), runs(model, 1, seed=4)])
+    assert np.all(np.diff(problem.clock) > 0.0)
+    assert problem.clock[-1] == pytest.approx(3 * ROWS * 30.0)
+
+
+def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
+    """In the angle it is the error of the length times the arm's sensitivity, and the path's."""
+    gain = discrepancy.sensitivity(problem, [])
     predicted = problem.simulate([])
-    draws = structure.decoys(problem, [], predicted, rng, 800)
-    assert draws.shape == (800, len(predicted))
-    gain = structure.sensitivity(problem, [])
-    expected = np.sqrt(np.mean((0.0004 * gain) ** 2) + problem.noise ** 2)
-    assert np.sqrt(np.mean(draws ** 2)) == pytest.approx(expected, rel=0.08)
-    assert abs(np.mean(draws)) < 0.1 * expected
+    path = discrepancy.path_difference(problem, [])
+    found = discrepancy.covariance(problem, gain, predicted, path, Settings())
+    assert np.diag(found) == pytest.approx((0.0004 * gain) ** 2 + path ** 2)
+    assert found == pytest.approx(found.T)
+    assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
+
+
+def test_errors_of_rows_that_are_near_in_drive_and_response_are_alike(problem):
+    """More so on the same way of the drive than on the way back."""
+    gain, predicted = discrepancy.sensitivity(problem, []), problem.simulate([])
+    found = discrepancy.covariance(problem, gain, predicted, 0.0 * gain, Settings())
+    size = np.sqrt(np.diag(found))
+    correlation = found / np.outer(size, size)
+    drive, direction = problem.signals['drive'], problem.signals['direction'] > 0.0
+    near = np.hypot((drive[:, None] - drive) / np.ptp(drive),
+                    (predicted[:, None] - predicted) / np.ptp(predicted))
+    same = direction[:, None] == direction[None, :]
+    close = near < 0.05
+    assert correlation[close & same].min() > 0.9
+    assert 0.4 < correlation[close & ~same].mean() < 0.8
+    assert correlation[near > 1.2].max() < 0.1
 
 
 def test_the_sensitivity_is_the_slope_of_the_arm(problem):
     """A longer muscle raises the angle by the inverse of dL/dtheta, less what the load gives."""
-    gain = structure.sensitivity(problem, [])
+    gain = discrepancy.sensitivity(problem, [])
     theta = problem.measured
     step = 1e-5
     length = problem.model.geometry.length
@@ -220,11 +162,75 @@ def test_the_sensitivity_is_the_slope_of_the_arm(problem):
     assert np.median(gain * slope) == pytest.approx(1.0, abs=0.3)
 
 
-def test_a_model_without_verification_falls_back_on_what_it_has():
-    """The error of the fitted trials counts where no others are, and none is zero."""
-    model = bicep_model(metrics={'length': {'identification': {'rmse': 0.001}}})
-    assert structure.length_error(model) == 0.001
-    assert structure.length_error(bicep_model(metrics={})) == 0.0
+def test_the_largest_error_that_the_bench_has_shown_counts():
+    """Of trials and of loads that were left out; else that of the fitted trials, else none."""
+    def error(**length):
+        return discrepancy.length_error(bicep_model(metrics={
+            'length': {part: {'rmse': value} for part, value in length.items()}}))
+    assert error(verification=0.0004) == 0.0004
+    assert error(verification=0.0004, left_out=0.0015) == 0.0015
+    assert error(verification=0.0004, left_out=0.0001) == 0.0004
+    assert error(identification=0.001) == 0.001
+    assert error(identification=0.001, verification=0.0004) == 0.0004
+    assert error(left_out=None, verification=float('nan')) == 0.0
+    assert discrepancy.length_error(bicep_model(metrics={})) == 0.0
+
+
+def path_of(model, measured):
+    """Return the difference between a load that moves and one that acted all along."""
+    return discrepancy.path_difference(problem_for(model, [measured]), [])
+
+
+@pytest.mark.parametrize('voltage', [0.0, 2.0, 4.0, 6.0])
+def test_a_load_that_holds_still_leaves_nothing_that_the_bench_cannot_tell(voltage):
+    """An arm at rest is as on the bench: the load that acts has acted all along."""
+    model = bicep_model()
+    measured = arm_run(np.full(20, voltage))
+    assert np.abs(path_of(model, measured)).max() < 1e-6
+
+
+def test_a_load_that_moves_with_the_arm_leaves_a_difference():
+    """Largest in the middle of the transformation, none at its ends, and less for a light arm."""
+    model = bicep_model()
+    both_ways = np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)])
+    path = np.abs(path_of(model, arm_run(both_ways)))
+    assert 1e-3 < path.max() < 0.02
+    assert max(path[0], path[-1]) < 0.1 * path.max()
+    assert path.max() == max(path[5:35])
+    light = bicep_model(geometry=dataclasses.replace(
+        GEOMETRY, payload_mass=1e-4, forearm_mass=1e-4))
+    assert np.abs(path_of(light, arm_run(both_ways))).max() < 0.02 * path.max()
+
+
+@pytest.mark.parametrize('verdict, names, alternatives, unobservable, words', [
+    ('unknown', ['backlash'], [], {}, ['repeat the recording', 'like backlash shows best']),
+    ('missing', ['payload_error'], [['encoder_offset']], {},
+     ['to tell payload_error from encoder_offset']),
+    ('missing', ['payload_error', 'slack'], [[], []], {}, ['--add payload_error,slack']),
+    ('adequate', [], [], {'thermal_lag': 'every row is settled'}, ['to see thermal_lag, too']),
+    ('adequate', [], [], {}, ['nothing'])])
+def test_the_next_experiment_follows_from_the_verdict(
+        verdict, names, alternatives, unobservable, words):
+    """What a person would do: tell apart, repeat, add, or look for what could not show."""
+    text = next_experiment(verdict, names, alternatives, unobservable)
+    assert all(word in text for word in words)
+
+
+def test_ranked_effects_say_with_what_they_are_confused_and_what_weights_absorb():
+    """Signatures along each other are confused; one along a weight's column is absorbed."""
+    rows = [{'effect': name} for name in ('one', 'twin', 'other')]
+    signatures = np.array([[1.0, 0.0, 0.0], [-2.0, 0.1, 0.0], [0.0, 0.0, 1.0]])
+    add_signatures(rows, signatures, np.array([[0.0], [0.0], [3.0]]))
+    assert [row['confused_with'] for row in rows] == [['twin'], ['one'], []]
+    assert [row['absorbed'] for row in rows] == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_the_ranking_begins_with_the_answer_and_ends_with_what_is_not_physical():
+    """In between the error on rows that were not fitted decides."""
+    rows = [{'effect': name, 'plausible': name != 'odd', 'rmse_after': after} for name, after in (
+        ('odd', 0.1), ('second', 0.5), ('weak', 0.9), ('good', 0.3), ('first', 0.7))]
+    assert [row['effect'] for row in in_order(rows, ['first', 'second'])] == [
+        'first', 'second', 'good', 'weak', 'odd']
 
 
 def test_whole_trials_are_held_out_together():

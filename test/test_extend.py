@@ -154,6 +154,22 @@ def test_recordings_of_two_kinds_are_refused(base, recordings):
         extend(base, ['payload_error'], [recordings[0], bench])
 
 
+def test_a_test_recording_of_another_kind_is_refused(base, recordings, tmp_path, capsys):
+    """An error in metres beside one in radians would say nothing."""
+    bench = Measurement.from_columns({
+        'trial': np.zeros(3), 'step': np.arange(3.0), 'voltage': np.arange(3.0),
+        'force': np.ones(3), 'length': np.zeros(3)})
+    base.save(tmp_path / 'model.yaml')
+    write_csv(recordings[0], tmp_path / 'train.csv')
+    write_csv(bench, tmp_path / 'test.csv')
+    assert main(['extend', '--model', str(tmp_path / 'model.yaml'), '--add', 'payload_error',
+                 '--data', str(tmp_path / 'train.csv'), '--test', str(tmp_path / 'test.csv'),
+                 '-o', str(tmp_path / 'new.yaml')]) == 1
+    error = capsys.readouterr().err
+    assert error.count('\n') == 1 and 'several kinds' in error
+    assert not (tmp_path / 'new.yaml').exists()
+
+
 def test_the_command_says_the_gain_and_writes_model_json_and_page(
         base, recordings, tmp_path, capsys):
     """From files to files."""

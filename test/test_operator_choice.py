@@ -15,7 +15,7 @@ from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.identification.candidates import Candidate, candidates, FittedModel
 from hysteresis_ros.identification.choice import compare_operators, MOST_ROWS
 from hysteresis_ros.identification.operators import fit_operator
-from hysteresis_ros.laboratory.protocols import bench_tables
+from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.measurements import Measurement, write_csv
 from hysteresis_ros.operators import BoucWen, Cascade, Linear, Preisach, PrandtlIshlinskii
 

@@ -45,6 +45,8 @@ def diagnosis(verdict='missing', **changes):
     content = {
         'missing': ['payload_error'], 'alternatives': [['encoder_offset']],
         'ranking': [row('payload_error', 0.002), row('supply_sag', 0.05, False)],
+        'sets': [{'effects': ['payload_error'], 'probability': 0.9, 'rmse': 0.002},
+                 {'effects': ['unknown'], 'probability': 0.1, 'rmse': 0.08}],
         'noise_floor': 1e-3, 'structural_error': 5e-3, 'unexplained': 0.01,
         'experiment': 'weigh the payload & the forearm', 'effects': [], 'rmse_before': 0.08,
         'rmse_after': 0.002, 'not_excited': {'latency': 'every row is settled'}, 'event': None,

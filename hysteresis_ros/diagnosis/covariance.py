@@ -103,7 +103,7 @@ class Covariance:
 
     def start(self, drift: float = 0.1, noise: float = 0.0) -> np.ndarray:
         """Return values (4,) with a drift and a noise given as shares of the discrepancy."""
-        return np.clip([0.0, np.log(drift * self._scale), self._middle,
+        return np.clip([0.0, np.log(max(drift * self._scale, _TINY)), self._middle,
                         np.log(max(noise * self._scale, self.resolution))], self._low, self._high)
 
     def _parts(self, values):

@@ -11,9 +11,13 @@ from hysteresis_ros.diagnosis.bench_verdict import bench_verdict
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.verdict import Diagnosis
+from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.workers import one_blas_thread
 
 __all__ = ['Diagnosis', 'diagnose']
+
+# Fewer rows cannot be divided into folds of which each says something.
+FEWEST_ROWS = 8
 
 
 def _silent(iterable, total):
@@ -50,9 +54,13 @@ def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
     Raises
     ------
     MeasurementError, ParameterError
-        If measurement and model do not fit together, or an effect is unknown.
+        If measurement and model do not fit together, there are too few rows, or an effect is
+        unknown.
     """
     problem = problem_for(model, measurements, effects, jobs)
+    if len(problem.measured) < FEWEST_ROWS:
+        raise MeasurementError(f'a diagnosis needs at least {FEWEST_ROWS} rows, and the recordings '
+                               f'have {len(problem.measured)}; record more, or give more files')
     rng = np.random.default_rng(seed)
     found = (bench_verdict(problem, settings, rng, jobs, progress) if problem.refits
              else arm_verdict(problem, settings, rng, progress))

@@ -135,7 +135,7 @@ def extend(model, names, train, test=()) -> Extension:
     MeasurementError
         If the recordings do not fit together.
     """
-    classes = _checked(problem_for(model, train), names)
+    classes = _checked(problem_for(model, [*train, *test]), names)
     replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
     base = model.with_effects([e for e in model.effects if e.id not in replaced])
     problem = problem_for(base, train)

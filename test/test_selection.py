@@ -1,0 +1,190 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which sets of effects are an answer: on recordings of an arm that the model itself has made."""
+
+import dataclasses
+
+from model_support import bicep_model, effect_of, runs
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis import events
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.selection import Selection
+from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.measurements import Measurement
+
+TRIED = ('payload_error', 'encoder_offset', 'supply_sag', 'frame_tilt')
+NOISE = 2e-3
+
+
+@pytest.fixture(scope='module')
+def model():
+    """Return the model without effects."""
+    return bicep_model()
+
+
+def recording(model, effects=(), noise=NOISE, change=0.0, seed=5):
+    """Return three settled trials of the arm with effects, with noise and a change of the angle."""
+    clean = runs(model.with_effects(list(effects)), rows=30)
+    rng = np.random.default_rng(seed)
+    angle = clean.column('angle') + noise * rng.standard_normal(clean.rows) + change
+    return Measurement.from_columns({**clean.columns, 'angle': angle})
+
+
+def selection(model, measured, names=TRIED, seed=0, **settings):
+    """Return what is found of some effects in a recording."""
+    problem = problem_for(model, [measured], names)
+    found = Selection(problem, dataclasses.replace(Settings(), **settings),
+                      np.random.default_rng(seed), lambda items, total: items)
+    found.run()
+    return found
+
+
+@pytest.fixture(scope='module')
+def payload(model):
+    """Return what is found where the arm carries 15 g more."""
+    return selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+
+
+def test_the_planted_effect_is_the_most_probable_answer(payload):
+    """With its value, and it leaves nothing that the base model's own error could not be."""
+    best = payload.valid()[0]
+    assert best == {'payload_error'}
+    fit = payload.fits[best]
+    assert fit.effects[0].values['dm'] == pytest.approx(15.0, abs=2.0)
+    assert payload.sufficient(best) and not payload.sufficient(frozenset())
+    assert payload.log_posterior(best) > payload.log_posterior(frozenset()) + 10.0
+
+
+def test_a_larger_set_is_no_answer_where_a_smaller_one_suffices(payload):
+    """Each of its effects would have to matter, and beside the planted one nothing does."""
+    larger = [names for names in payload.fits if len(names) > 1 and 'payload_error' in names]
+    assert larger
+    assert not set(larger) & set(payload.valid())
+
+
+def two_effects(model):
+    """Return a recording of an arm that carries 25 g more, of a supply that sags."""
+    return recording(model, [effect_of(model, 'payload_error', dm=25.0),
+                             effect_of(model, 'supply_sag', Rs=0.8)])
+
+
+def test_two_effects_are_found_as_a_pair_where_neither_suffices():
+    """A lighter payload hides a sag in part, so that either alone explains nothing."""
+    model = bicep_model(metrics={'length': {'verification': {'rmse': 0.0001}}})
+    found = selection(model, recording(model, [
+        effect_of(model, 'payload_error', dm=-15.0), effect_of(model, 'supply_sag', Rs=0.8)]))
+    planted = frozenset(['payload_error', 'supply_sag'])
+    assert found.valid()[0] == planted
+    assert found.sufficient(planted)
+    for name in planted:
+        assert not found.sufficient(frozenset([name]))
+
+
+def test_two_effects_behind_one_are_found_as_a_pair(model):
+    """A heavier payload may leave no more than the bench's error, but not with that shape."""
+    found = diagnose(model, [two_effects(model)], TRIED)
+    assert (found.verdict, set(found.missing)) == ('missing', {'payload_error', 'supply_sag'})
+
+
+def test_an_effect_has_to_matter_by_a_practical_size(model):
+    """One that is certainly there but takes off a few per cent is no answer to a user."""
+    measured = recording(model, [effect_of(model, 'payload_error', dm=15.0)], noise=0.02)
+    found = selection(model, measured, ('payload_error',))
+    planted = frozenset(['payload_error'])
+    assert planted in found.valid()
+    gain = 1.0 - found.error(planted) / found.error(frozenset())
+    assert 0.1 < gain < 0.99
+    found.settings = dataclasses.replace(found.settings, practical=gain + 0.01)
+    assert planted not in found.valid()
+
+
+def test_an_implausible_set_is_no_answer_however_well_it_explains(model):
+    """A payload that is too heavy by more than its range is something else."""
+    far = effect_of(model, 'payload_error', dm=15.0)
+    high = next(p for p in far.parameters if p.name == 'dm').high
+    measured = recording(model, [effect_of(model, 'payload_error', dm=1.5 * high)])
+    found = selection(model, measured, ('payload_error',))
+    fit = found.fits[frozenset(['payload_error'])]
+    assert fit.implausible() == ['payload_error.dm']
+    assert found.error(frozenset(['payload_error'])) < 0.3 * found.error(frozenset())
+    assert found.valid() == [frozenset()]
+    told = diagnose(model, [measured], ['payload_error'])
+    assert (told.verdict, told.missing) == ('unknown', [])
+    assert told.resembles == ['payload_error']
+
+
+def test_p_values_are_those_of_the_whole_family(model):
+    """The more effects could have been named by chance, the less is a gain worth."""
+    measured = recording(model, noise=0.035)
+    alone, among = (selection(model, measured, names).p_values for names in (
+        ('payload_error',), TRIED))
+    assert set(among) == set(TRIED)
+    assert min(among.values()) > 0.05
+    assert among['payload_error'] >= alone['payload_error'] - 0.05
+
+
+def test_a_planted_effect_has_the_smallest_p_value_that_the_draws_allow(payload):
+    """No draw of chance gains as much."""
+    assert payload.p_values['payload_error'] == pytest.approx(1.0 / (1 + payload.settings.draws))
+
+
+def test_the_same_seed_gives_the_same_p_values(model):
+    """And another one others, or nothing would be drawn."""
+    measured = recording(model, noise=0.035)
+    first, again, other = (selection(model, measured, TRIED[:2], seed).p_values
+                           for seed in (1, 1, 2))
+    assert first == again
+    assert first != other
+
+
+def test_noise_is_no_evidence_for_any_effect(model):
+    """Two degrees of white noise, and no set is an answer; the model itself suffices."""
+    found = selection(model, recording(model, noise=0.035))
+    assert found.valid() == [frozenset()]
+    assert found.ranked()[0] == frozenset()
+    assert found.base.point.noise == pytest.approx(0.035, rel=0.2)
+
+
+def test_something_that_happened_once_has_its_time(model):
+    """A step of the angle at a moment: an unknown, told by when it happened."""
+    rows = 90
+    row = 52
+    measured = recording(model, change=0.15 * (np.arange(rows) >= row))
+    found = selection(model, measured, ('payload_error', 'supply_sag'))
+    time, log_posterior = events.most_probable(found.problem, found)
+    assert abs(time - found.problem.clock[row]) <= 60.0
+    best = max((found.log_posterior(names) for names in found.valid()), default=-np.inf)
+    assert log_posterior > best / found.settings.temper
+    told = diagnose(model, [measured], ['payload_error', 'supply_sag'])
+    assert (told.verdict, told.missing, told.event) == ('unknown', [], time)
+
+
+def test_a_recording_without_an_event_has_none(model):
+    """An effect that acts all the time is more probable than a step."""
+    measured = recording(model, [effect_of(model, 'payload_error', dm=15.0)])
+    told = diagnose(model, [measured], ['payload_error', 'supply_sag'])
+    assert (told.verdict, told.event) == ('missing', None)
+
+
+def test_what_cannot_be_told_apart_is_named_as_an_alternative(model):
+    """A tilt and an offset of the encoder: whichever is named, the planted one is reported."""
+    measured = recording(model, [effect_of(model, 'encoder_offset', offset=3.0)])
+    told = diagnose(model, [measured], ['encoder_offset', 'frame_tilt', 'supply_sag'])
+    assert told.verdict == 'missing'
+    assert 'encoder_offset' in {*told.missing, *(n for some in told.alternatives for n in some)}
+    sets = {tuple(row['effects']): row['probability'] for row in told.sets}
+    assert sum(sets.values()) == pytest.approx(1.0)
+    assert sets[tuple(sorted(told.missing))] == max(sets.values())
+
+
+def test_of_starts_without_any_effect_a_fit_still_finds_the_stop(model):
+    """A stop is looked for where the response ends, though stops out of reach change nothing."""
+    clean = recording(model)
+    stop = float(np.quantile(clean.column('angle'), 0.8))
+    measured = recording(model, [effect_of(model, 'end_stop', stop=stop, side=1.0, stiffness=8.0)])
+    told = diagnose(model, [measured], ['end_stop', 'payload_error'])
+    assert told.missing == ['end_stop']
+    assert told.effects[0].values['stop'] == pytest.approx(stop, abs=0.03)
