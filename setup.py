@@ -5,6 +5,8 @@
 from glob import glob
 import os
 import re
+import subprocess
+import sys
 
 from setuptools import find_packages, setup
 
@@ -27,7 +29,7 @@ exec "$(dirname "$(readlink -f "$0")")/../../bin/{name}" "$@"
 
 class InstallData(install_data):
     """
-    Data files, and in a wheel what `ros2 run` needs.
+    Data files; in a wheel what `ros2 run` needs, elsewhere compiled functions.
 
     pip puts executables into bin/ whatever setup.cfg says, while `ros2 run` looks in
     lib/hysteresis_ros/. So a wheel carries small launchers for that folder. colcon follows
@@ -35,10 +37,23 @@ class InstallData(install_data):
     """
 
     def run(self):
-        """Install the files, then the launchers."""
+        """Install the files, then the launchers or the compiled functions."""
         super().run()
-        if 'bdist_wheel' not in self.distribution.commands:
-            return
+        if 'bdist_wheel' in self.distribution.commands:
+            self._install_launchers()
+        elif not self.root:
+            self._compile()
+
+    def _compile(self):
+        """Fill the cache of compiled functions, so that no node waits for it at its first start."""
+        installed = self.get_finalized_command('install').install_lib
+        path = os.pathsep.join(filter(None, [installed, os.environ.get('PYTHONPATH')]))
+        # What is not compiled now is compiled when it is first needed.
+        subprocess.run([sys.executable, '-m', f'{PACKAGE}.kernels.warm_up'], check=False,
+                       env={**os.environ, 'PYTHONPATH': path}, cwd=installed,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def _install_launchers(self):
         folder = os.path.join(self.install_dir, 'lib', PACKAGE)
         self.mkpath(folder)
         for name in EXECUTABLES:

@@ -150,7 +150,8 @@ def ranking_row(effect, fit, before: float, after: float, p_value: float, gain: 
         Interval of the relative reduction of the RMSE.
     """
     return {'effect': effect.id, 'rmse_before': before, 'rmse_after': after,
-            'gain': 1.0 - after / before if before > 0.0 else 0.0, 'gain_low': gain[0], 'gain_high': gain[1],
+            'gain': 1.0 - after / before if before > 0.0 else 0.0,
+            'gain_low': gain[0], 'gain_high': gain[1],
             'p_value': p_value, 'parameters': effect.to_dict()['parameters'],
             'plausible': not fit.implausible()}
 

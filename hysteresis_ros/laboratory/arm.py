@@ -246,7 +246,7 @@ class Arm:
 
     def _cool_under_load(self) -> None:
         """Heat fully and cool again with the arm's own load on the wires, which remember it."""
-        def balance(temperature):
+        def balance(temperature: float) -> None:
             self.temperature = temperature
             self._settle_down()
         room = self.temperature

@@ -161,6 +161,8 @@ class BrinsonWire(Wire):
         Constants of this specimen.
     """
 
+    material: BrinsonMaterial
+
     def heat_and_cool(self, temperature: float = 22.0, tension: float | None = None) -> None:
         """Heat until all is austenite, cool, and so wipe the memory; see `Wire`."""
         tension = self.material.pretension if tension is None else tension

@@ -148,6 +148,8 @@ class GrainWire(Wire):
         Constants of this specimen.
     """
 
+    material: GrainMaterial
+
     def __init__(self, material: GrainMaterial):
         self._heating, self._cooling = material.grains.temperatures(
             material.grain_count, material.grain_offset)

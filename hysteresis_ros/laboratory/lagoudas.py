@@ -28,6 +28,7 @@ Morphing Structures (C. Nauck and E. Peraza Hernandez, Texas A&M University). Th
 martensite than austenite, which serves its fit only; the moduli here are those of Brinson (1993).
 """
 
+from collections.abc import Callable
 import dataclasses
 import functools
 import math
@@ -109,6 +110,7 @@ class LagoudasMaterial(Material):
         loop = vary(rng, 1.0, 0.05)
         middle = usual.austenite_start - usual.martensite_finish
         finish = usual.martensite_finish + shift
+        first, second, third, fourth = usual.exponents
         return dataclasses.replace(
             usual, martensite_finish=finish,
             martensite_start=finish + width * (usual.martensite_start - usual.martensite_finish),
@@ -122,7 +124,8 @@ class LagoudasMaterial(Material):
             strain_rate=vary(rng, usual.strain_rate, 0.08),
             austenite_slope=vary(rng, usual.austenite_slope, 0.03),
             martensite_slope=vary(rng, usual.martensite_slope, 0.03),
-            exponents=tuple(vary(rng, value, 0.05) for value in usual.exponents))
+            exponents=(vary(rng, first, 0.05), vary(rng, second, 0.05), vary(rng, third, 0.05),
+                       vary(rng, fourth, 0.05)))
 
     def wire(self) -> 'LagoudasWire':
         """Return a new wire, cold."""
@@ -156,6 +159,8 @@ class LagoudasWire(Wire):
     material : LagoudasMaterial
         Constants of this specimen.
     """
+
+    material: LagoudasMaterial
 
     def __init__(self, material: LagoudasMaterial):
         self._soft = 1.0 / material.martensite_modulus - 1.0 / material.austenite_modulus
@@ -235,7 +240,7 @@ class LagoudasWire(Wire):
 
 
 @functools.lru_cache(maxsize=64)
-def _inverse_hardening(low: float, high: float):
+def _inverse_hardening(low: float, high: float) -> Callable[[float], float]:
     """Return the function that gives the share xi where (1 + xi^low - (1 - xi)^high) / 2 is."""
     # Shares crowd at both ends, where the exponents below one make the function steep.
     up = np.linspace(0.0, 1.0, 40001) ** 8
