@@ -228,7 +228,7 @@ class Selection:
 
         All values are physical, and each effect matters: without it the error is larger by a
         practical size and by more than the expected error of the base model, and if others stay,
-        it is larger than the base model's own error could be.
+        it is larger than the base model's own error could be, or these are clearly less probable.
         A single effect also has to explain more than the best of all would by chance.
         """
         return [names for names in self.ranked()
@@ -244,9 +244,16 @@ class Selection:
             least = max(self.settings.practical * before,
                         LEAST_SHARE * self.error(frozenset()))
             if (before - error < least or before ** 2 - error ** 2 < self.covariance.size ** 2
-                    or (without and self.sufficient(without))):
+                    or (without and self._would_do(without, names))):
                 return False
         return True
+
+
+    def _would_do(self, without, names) -> bool:
+        """Whether a smaller set suffices and is not clearly less probable than the larger one."""
+        odds = self.log_posterior(names) - self.log_posterior(without)
+        return self.sufficient(without) and (
+            odds / self.settings.temper < -math.log(self.settings.reported))
 
 
 def _subsets(names) -> list[frozenset]:
