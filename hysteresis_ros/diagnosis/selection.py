@@ -105,9 +105,12 @@ class Selection:
         return family.p_values(self.base.point, self.rng, self.settings.draws)
 
     def _worth_growing(self) -> bool:
-        """Whether no set explains the recording yet, so that larger ones are looked for."""
+        """Whether the best set leaves more than its equations could, so that larger ones are due."""
         valid = self.valid()
-        return not valid or not self.sufficient(valid[0])
+        if not valid:
+            return True
+        form = self.settings.form * self.structure(frozenset()) if valid[0] else 0.0
+        return self.structure(valid[0]) > math.hypot(self.limit, form)
 
     def grow(self, names) -> None:
         """Fit the best sets of one more effect than those named."""

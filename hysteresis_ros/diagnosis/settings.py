@@ -32,6 +32,9 @@ class Settings:
         weights of the bench's grid are smooth over about half of it.
     practical : float
         Smallest reduction of the RMSE that matters to a user.
+    form : float
+        Share by which an effect's equation may be off: what one effect may leave of the first
+        residual without a further one being looked for.
     residual_share : float
         Share of the first mean square that one effect may leave beyond the discrepancy.
     temper : float
@@ -52,6 +55,7 @@ class Settings:
     scale_spread: float = 0.3
     correlation: float = 0.45
     practical: float = 0.05
+    form: float = 0.1
     residual_share: float = 0.08
     temper: float = 2.0
     reported: float = 0.02
