@@ -100,10 +100,15 @@ class _Verdict:
     def _probabilities(self, valid, event_log) -> dict:
         """Return the posterior probability of each set, and of 'unknown'."""
         temper = self.settings.temper
-        # What does not suffice needs one cause more, as improbable as any other effect.
+        # What does not suffice needs one cause more, as improbable as any other effect. Drift and
+        # discrepancy stand for that cause, and are no evidence against a set that does suffice.
         further = math.log(self.settings.prior / (1.0 - self.settings.prior))
-        weights = {names: (self.selection.log_posterior(names) + (
-            0.0 if self.selection.sufficient(names) else further)) / temper for names in valid}
+        logs = {names: self.selection.log_posterior(names) for names in valid}
+        most = max((logs[names] for names in valid if self.selection.sufficient(names)),
+                   default=np.inf)
+        weights = {names: (value if self.selection.sufficient(names)
+                           else min(value, most) + further) / temper
+                   for names, value in logs.items()}
         top = max([event_log, *weights.values()])
         mass = {names: math.exp(value - top) for names, value in weights.items()}
         unknown = math.exp(event_log - top)
