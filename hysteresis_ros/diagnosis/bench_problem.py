@@ -14,10 +14,11 @@ import numpy as np
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import SensorEffect
 from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.identification.least_squares import SLACK, fit_weights, quick_weights
-from hysteresis_ros.identification.operators import preisach_rows, smoothness
+from hysteresis_ros.identification.least_squares import SLACK, fit_weights
+from hysteresis_ros.identification.operators import smoothness
+from hysteresis_ros.identification.projection import ProjectedWeights
+from hysteresis_ros.kernels.shares import shares
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.simulation import turning_rows
 from hysteresis_ros.operators import Preisach, cell_areas
 
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
@@ -33,11 +34,30 @@ FINER = 1.0, 1.5, 2.0
 
 @dataclasses.dataclass
 class Design:
-    """The least squares problem of H2's weights: areas (n, K), known part (n,), grid nodes."""
+    """
+    The least squares problem of H2's weights.
 
-    rows: np.ndarray
+    `shares` (n, K + 1) say what each weight, times the size of its cell, and last the bias
+    contribute to the response; `known` (n,) is the part without weights.
+    """
+
+    shares: np.ndarray
     known: np.ndarray
     nodes: np.ndarray
+
+    @property
+    def rows(self) -> np.ndarray:
+        """What each weight contributes to the response, shape (n, K)."""
+        return self.shares[:, :-1] * _scale(self.nodes)
+
+
+@dataclasses.dataclass
+class Solution:
+    """Effects with the weights that suit the training rows best, and what both predict (n,)."""
+
+    weights: ProjectedWeights
+    predicted: np.ndarray
+    phases: list | None
 
 
 @dataclasses.dataclass
@@ -67,7 +87,7 @@ class BenchProblem(Problem):
                                    f'model has a {stage.kind} one; identify it with --operator '
                                    'two-stage or preisach')
         self.levels = len(stage.nodes) - 1
-        self._passive = None
+        self._passive = {}
         self._square = None
         self._phases_of = self._known_phases = None
 
@@ -78,12 +98,15 @@ class BenchProblem(Problem):
         course = self._course(chain, phases)
         nodes = self._nodes(course, levels or self.levels)
         picked = self._picked()
-        rows = np.concatenate([
-            _areas(nodes, part, keep) for part, keep in zip(course.inputs, picked)])
-        rows *= np.concatenate(
-            [scale[keep] for scale, keep in zip(course.scales, picked)])[:, None]
-        return Design(rows, np.concatenate(
-            [value[keep] for value, keep in zip(course.known, picked)]), nodes)
+        wanted = [np.zeros(len(part), dtype=bool) for part in course.inputs]
+        for chosen, keep in zip(wanted, picked):
+            # The first input is the cold one.
+            chosen[keep + 1] = True
+        areas = shares(nodes, np.concatenate(course.inputs),
+                       np.cumsum([len(part) for part in course.inputs]), np.concatenate(wanted))
+        scale, known = (np.concatenate([column[keep] for column, keep in zip(columns, picked)])
+                        for columns in (course.scales, course.known))
+        return Design(np.column_stack([areas * scale[:, None], np.ones(len(areas))]), known, nodes)
 
     def _course(self, chain, phases) -> Course:
         model = self.model
@@ -135,8 +158,9 @@ class BenchProblem(Problem):
                *((effect.id, *effect.values.items()) for effect in effects))
         if key != self._phases_of:
             design = self._design(effects, train=train)
-            weights, _ = self._weights(design, train)
-            self._known_phases = self._phases_with(effects, _stage(design.nodes, weights, 0.0))
+            z = self._projected(design, train).z
+            self._known_phases = self._phases_with(
+                effects, _stage(design.nodes, z[:-1] / _scale(design.nodes), 0.0))
             self._phases_of = key
         return self._known_phases
 
@@ -183,27 +207,70 @@ class BenchProblem(Problem):
 
     def simulate(self, effects, train=None) -> np.ndarray:
         """Return the response of the judged rows, shape (n,), weights fitted to `train` (n,)."""
-        design = self._design(effects, train=train)
-        weights, bias = self._weights(design, train)
-        response = design.rows @ weights + bias + design.known
+        return self.solve(effects, train).predicted
+
+    def solve(self, effects, train=None) -> Solution:
+        """
+        Fit H2's weights beside effects.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        train : ndarray of bool, shape (n,), optional
+            Rows to fit; all by default.
+        """
+        phases = None
+        if any(effect.needs_phase for effect in effects):
+            phases = self._phases(effects, train)
+        design = self._design(effects, phases=phases)
+        weights = self._projected(design, train)
+        return Solution(weights, self._response(effects, design, weights.z), phases)
+
+    def near(self, solution, effects, train=None) -> np.ndarray:
+        """
+        Return the response for effects that differ a little from those of a solution.
+
+        To first order in the weights; those that are zero stay so, and the martensite share that
+        effects may look at stays as it is.
+
+        Parameters
+        ----------
+        solution : Solution
+        effects : sequence of Effect
+            The same effects with other values.
+        train : ndarray of bool, shape (n,), optional
+            The rows that the solution was fitted to.
+        """
+        design = self._design(effects, phases=solution.phases)
+        z = solution.weights.moved(*self._rows(design, train))
+        return self._response(effects, design, z)
+
+    def _response(self, effects, design, z):
+        response = design.shares @ z + design.known
         for effect in effects:
             if isinstance(effect, SensorEffect):
                 response = self._sensed(effect, response)
         return response
 
-    def _weights(self, design, train):
-        rows = slice(None) if train is None else train
+    def _rows(self, design, train):
+        """Return design and target of the training rows."""
+        target = self.measured - design.known
+        return (design.shares, target) if train is None else (design.shares[train], target[train])
+
+    def _projected(self, design, train):
         # Neighbouring parameters have neighbouring weights.
-        weights, bias, self._passive = quick_weights(
-            design.rows[rows], (self.measured - design.known)[rows],
-            _scale(design.nodes), self._penalty(design.nodes), self._passive)
-        return weights, bias
+        key = None if train is None else train.tobytes()
+        found = ProjectedWeights(*self._rows(design, train), self._penalty(design.nodes),
+                                 self._passive.get(key, self._passive.get(None)))
+        self._passive[key] = found.passive
+        return found
 
     def _penalty(self, nodes):
         """Square of the penalty; it is the same for all grids of equal intervals."""
         if self._square is None:
             root = smoothness(nodes, reversible=True)
-            self._square = SEARCH_STRENGTH * root.T @ root
+            self._square = np.pad(SEARCH_STRENGTH * root.T @ root, (0, 1))
         return self._square
 
     def _sensed(self, effect, response):
@@ -241,15 +308,6 @@ def _stage(nodes, weights, bias):
     """Return the operator with weights of shape (K + N,); `bias` is its least output."""
     count = len(cell_areas(nodes))
     return Preisach(nodes, weights[:count], bias + float(weights @ _scale(nodes)), weights[count:])
-
-
-def _areas(nodes, part, keep):
-    """Areas above saturation, (rows, K + N), of the kept rows; the first input is the cold one."""
-    wanted = np.zeros(len(part), dtype=bool)
-    wanted[keep + 1] = True
-    needed = wanted | turning_rows(part)
-    rows = preisach_rows(nodes, part[needed], reversible=True) + _scale(nodes)
-    return rows[wanted[needed]]
 
 
 def _scale(nodes):
