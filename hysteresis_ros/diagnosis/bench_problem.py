@@ -24,6 +24,8 @@ from hysteresis_ros.operators import Preisach, cell_areas
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
 # the solution is unique. More of it bends the effects' own parameters.
 SEARCH_STRENGTH = 1e-8
+# Designs of the latest effects that are remembered.
+MOST_DESIGNS = 20
 # How often weights and the martensite share that they show are fitted to each other.
 PHASE_PASSES = 2
 # A finer grid has to lower the held-out error by this share.
@@ -63,15 +65,15 @@ class Solution:
 @dataclasses.dataclass
 class Course:
     """
-    What H2 is given in each trial, and what is done to its output.
+    What H2 is given, trial after trial, and what is done to its output.
 
-    `inputs` (rows + 1,) begin with the cold one; `scales` and `known` (rows,) multiply the output
-    above its least and are added to it.
+    `inputs` (rows + trials,) begin each trial with the cold one; `scales` and `known` (rows,)
+    multiply the output above its least and are added to it.
     """
 
-    inputs: list
-    scales: list
-    known: list
+    inputs: np.ndarray
+    scales: np.ndarray
+    known: np.ndarray
 
 
 class BenchProblem(Problem):
@@ -87,64 +89,78 @@ class BenchProblem(Problem):
                                    f'model has a {stage.kind} one; identify it with --operator '
                                    'two-stage or preisach')
         self.levels = len(stage.nodes) - 1
+        self._trials = [trial for simulator in self.simulators for trial in simulator.trials]
+        counts = np.array([len(trial.drive) for trial in self._trials])
+        # Before its first row each trial has the cold one, with that row's load.
+        self._ends = np.cumsum(counts + 1)
+        rows = np.arange(counts.sum())
+        self._felt = np.insert(rows, np.cumsum(counts) - counts, np.cumsum(counts) - counts)
+        self._load = np.concatenate([trial.load for trial in self._trials])
+        begins = np.cumsum([0] + [simulator.measurement.rows for simulator in self.simulators])
+        self._judged = np.concatenate(
+            [begin + chosen for begin, chosen in zip(begins, self.chosen)])
+        self._wanted = np.zeros(self._ends[-1], dtype=bool)
+        self._wanted[self._judged + np.repeat(np.arange(1, len(counts) + 1), counts)[
+            self._judged]] = True
         self._passive = {}
+        self._designs = {}
         self._square = None
         self._phases_of = self._known_phases = None
 
     def _design(self, effects, levels=None, train=None, phases=None) -> Design:
-        chain = Chain(effects, self.model.surroundings)
-        if chain.needs_phase and phases is None:
+        key = None
+        if phases is None and not any(effect.needs_phase for effect in effects):
+            key = levels, *((effect.id, *effect.values.values()) for effect in effects)
+            if key in self._designs:
+                return self._designs[key]
+        elif phases is None:
             phases = self._phases(effects, train)
-        course = self._course(chain, phases)
+        course = self._course(Chain(effects, self.model.surroundings), phases)
         nodes = self._nodes(course, levels or self.levels)
-        picked = self._picked()
-        wanted = [np.zeros(len(part), dtype=bool) for part in course.inputs]
-        for chosen, keep in zip(wanted, picked):
-            # The first input is the cold one.
-            chosen[keep + 1] = True
-        areas = shares(nodes, np.concatenate(course.inputs),
-                       np.cumsum([len(part) for part in course.inputs]), np.concatenate(wanted))
-        scale, known = (np.concatenate([column[keep] for column, keep in zip(columns, picked)])
-                        for columns in (course.scales, course.known))
-        return Design(np.column_stack([areas * scale[:, None], np.ones(len(areas))]), known, nodes)
+        areas = shares(nodes, course.inputs, self._ends, self._wanted)
+        scale, known = (column[self._judged] for column in (course.scales, course.known))
+        design = Design(
+            np.column_stack([areas * scale[:, None], np.ones(len(areas))]), known, nodes)
+        if key is not None:
+            # Folds that are held out in turn begin at the same effects.
+            self._designs[key] = design
+            if len(self._designs) > MOST_DESIGNS:
+                del self._designs[next(iter(self._designs))]
+        return design
 
     def _course(self, chain, phases) -> Course:
-        model = self.model
-        first = model.first_stage(chain)
+        model, first, load = self.model, self.model.first_stage(chain), self._load
         cold = chain.to_heat(model.cold_drive)
-        course = Course([], [], [])
-        for number, trial in enumerate(self._trials()):
+        heats, drifts = [], []
+        for number, trial in enumerate(self._trials):
             inputs = trial.inputs
             if phases is not None:
                 inputs = inputs._replace(phase=phases[number])
             heat = chain.heat(trial.drive, inputs)
-            first.reset()
-            x = first.simulate(np.concatenate(([cold], heat)))
-            load = chain.load_inside(trial.load) if first.loaded else 0.0 * trial.load
-            course.inputs.append(model.sign * (x - np.concatenate((load[:1], load))))
-            offset, factor = chain.drift(trial.drive, heat, inputs)
-            course.scales.append(chain.scale(trial.load) * factor)
-            course.known.append(chain.stretch(trial.load) + offset)
-        return course
+            heats += [[cold], heat]
+            if chain.drifts:
+                drifts.append(chain.drift(trial.drive, heat, inputs))
+        x = self._first(first, np.concatenate(heats))
+        if first.loaded:
+            x -= chain.load_inside(load)[self._felt]
+        offset, factor = np.concatenate(drifts, axis=1) if drifts else (0.0, 1.0)
+        return Course(model.sign * x, chain.scale(load) * factor + 0.0 * load,
+                      chain.stretch(load) + offset)
 
-    def _trials(self) -> list:
-        return [trial for simulator in self.simulators for trial in simulator.trials]
+    def _first(self, first, heat):
+        """Return x for the heat of all trials, each from the cold state."""
+        x, begin = np.empty(len(heat)), 0
+        for end in self._ends:
+            first.reset()
+            x[begin:end] = first.simulate(heat[begin:end])
+            begin = end
+        return x
 
     @staticmethod
     def _nodes(course, levels):
-        low = min(part.min() for part in course.inputs)
-        high = max(part.max() for part in course.inputs)
+        low, high = course.inputs.min(), course.inputs.max()
         margin = 1e-6 * max(high - low, 1e-12)
         return np.linspace(low - margin, high + margin, levels + 1)
-
-    def _picked(self) -> list:
-        """Judged rows of each trial, counted from the trial's first."""
-        picked = []
-        for simulator, chosen in zip(self.simulators, self.chosen):
-            for trial in simulator.trials:
-                inside = (chosen >= trial.rows.start) & (chosen < trial.rows.stop)
-                picked.append(chosen[inside] - trial.rows.start)
-        return picked
 
     def _phases(self, effects, train) -> list:
         """
@@ -168,7 +184,8 @@ class BenchProblem(Problem):
         """Return the martensite share that H2 shows in every row of each trial."""
         model = dataclasses.replace(self.model, length_stage=stage)
         found = []
-        for part in self._course(Chain(effects, model.surroundings), phases).inputs:
+        inputs = self._course(Chain(effects, model.surroundings), phases).inputs
+        for part in np.split(inputs, self._ends[:-1]):
             stage.reset()
             stage.step(part[0])
             found.append(model.martensite(stage.simulate(part[1:])))
