@@ -24,8 +24,8 @@ from hysteresis_ros.operators import Preisach, cell_areas
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
 # the solution is unique. More of it bends the effects' own parameters.
 SEARCH_STRENGTH = 1e-8
-# Designs of the latest effects that are remembered.
-MOST_DESIGNS = 20
+# Courses that are remembered, those of the latest effects.
+MOST_COURSES = 20
 # How often weights and the martensite share that they show are fitted to each other.
 PHASE_PASSES = 2
 # A finer grid has to lower the held-out error by this share.
@@ -103,32 +103,34 @@ class BenchProblem(Problem):
         self._wanted[self._judged + np.repeat(np.arange(1, len(counts) + 1), counts)[
             self._judged]] = True
         self._passive = {}
-        self._designs = {}
+        self._courses = {}
         self._square = None
         self._phases_of = self._known_phases = None
 
-    def _design(self, effects, levels=None, train=None, phases=None) -> Design:
-        key = None
-        if phases is None and not any(effect.needs_phase for effect in effects):
-            key = levels, *((effect.id, *effect.values.values()) for effect in effects)
-            if key in self._designs:
-                return self._designs[key]
-        elif phases is None:
+    def _design(self, effects, levels=None, train=None, phases=None, columns=None) -> Design:
+        if phases is None and any(effect.needs_phase for effect in effects):
             phases = self._phases(effects, train)
-        course = self._course(Chain(effects, self.model.surroundings), phases)
+        course = self._course(effects, phases)
         nodes = self._nodes(course, levels or self.levels)
-        areas = shares(nodes, course.inputs, self._ends, self._wanted)
         scale, known = (column[self._judged] for column in (course.scales, course.known))
-        design = Design(
-            np.column_stack([areas * scale[:, None], np.ones(len(areas))]), known, nodes)
-        if key is not None:
-            # Folds that are held out in turn begin at the same effects.
-            self._designs[key] = design
-            if len(self._designs) > MOST_DESIGNS:
-                del self._designs[next(iter(self._designs))]
-        return design
+        if columns is None:
+            columns = np.arange(len(_scale(nodes)) + 1)
+        rows = shares(nodes, course.inputs, self._ends, self._wanted, scale, columns)
+        return Design(rows, known, nodes)
 
-    def _course(self, chain, phases) -> Course:
+    def _course(self, effects, phases) -> Course:
+        key = tuple((effect.id, *effect.values.values()) for effect in effects)
+        if phases is not None or key not in self._courses:
+            course = self._new_course(Chain(effects, self.model.surroundings), phases)
+            if phases is not None:
+                return course
+            # Folds that are held out in turn begin at the same effects.
+            self._courses[key] = course
+            if len(self._courses) > MOST_COURSES:
+                del self._courses[next(iter(self._courses))]
+        return self._courses[key]
+
+    def _new_course(self, chain, phases) -> Course:
         model, first, load = self.model, self.model.first_stage(chain), self._load
         cold = chain.to_heat(model.cold_drive)
         heats, drifts = [], []
@@ -184,7 +186,7 @@ class BenchProblem(Problem):
         """Return the martensite share that H2 shows in every row of each trial."""
         model = dataclasses.replace(self.model, length_stage=stage)
         found = []
-        inputs = self._course(Chain(effects, model.surroundings), phases).inputs
+        inputs = self._course(effects, phases).inputs
         for part in np.split(inputs, self._ends[:-1]):
             stage.reset()
             stage.step(part[0])
@@ -259,7 +261,7 @@ class BenchProblem(Problem):
         train : ndarray of bool, shape (n,), optional
             The rows that the solution was fitted to.
         """
-        design = self._design(effects, phases=solution.phases)
+        design = self._design(effects, phases=solution.phases, columns=solution.weights.columns)
         z = solution.weights.moved(*self._rows(design, train))
         return self._response(effects, design, z)
 

@@ -32,26 +32,37 @@ class ProjectedWeights:
     z : ndarray, shape (K,)
     passive : ndarray of bool, shape (K,)
         Which are not at their bound.
+    columns : ndarray of int, shape (P,)
+        The same as indices.
     """
 
     def __init__(self, design: np.ndarray, target: np.ndarray, penalty: np.ndarray,
                  start: np.ndarray | None = None):
         free = np.zeros(design.shape[1], dtype=bool)
         free[-1] = True
-        self.penalty = penalty
         self._gram = design.T @ design / len(target) + penalty
         self.z, self.passive = solve_nonnegative(
             self._gram, design.T @ target / len(target), free, start)
-        self._index: np.ndarray | None = None
+        self.columns = np.flatnonzero(self.passive)
+        self._penalty = penalty[np.ix_(self.columns, self.columns)]
         self._factor: np.ndarray | None = None
 
     def moved(self, design: np.ndarray, target: np.ndarray) -> np.ndarray:
-        """Return z for rows that differ a little, to first order, the passive set unchanged."""
-        if self._index is None:
-            self._index = np.flatnonzero(self.passive)
-            self._factor, _ = lapack.dpotrf(self._gram[np.ix_(self._index, self._index)])
-        slope = design.T @ (target - design @ self.z) / len(target) - self.penalty @ self.z
-        change, _ = lapack.dpotrs(self._factor, slope[self._index])
-        z = self.z.copy()
-        z[self._index] += change
-        return z
+        """
+        Return the weights for rows that differ a little, to first order.
+
+        Parameters
+        ----------
+        design : ndarray, shape (n, P)
+            Only the `columns`; all other weights stay at their bound.
+        target : ndarray, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (P,)
+        """
+        if self._factor is None:
+            self._factor, _ = lapack.dpotrf(self._gram[np.ix_(self.columns, self.columns)])
+        z = self.z[self.columns]
+        slope = design.T @ (target - design @ z) / len(target) - self._penalty @ z
+        return z + lapack.dpotrs(self._factor, slope)[0]

@@ -9,7 +9,7 @@ from .jit import jit
 
 
 @jit
-def shares(nodes, inputs, ends, wanted):
+def shares(nodes, inputs, ends, wanted, scale, columns):
     """
     Return twice the share of each cell whose relays are up, then that of each diagonal interval.
 
@@ -26,56 +26,68 @@ def shares(nodes, inputs, ends, wanted):
         Where in `inputs` each trial ends.
     wanted : ndarray of bool, shape (M,)
         Inputs whose rows are returned.
+    scale : ndarray, shape (rows wanted,)
+        Factor on each row.
+    columns : ndarray of int, shape (C,)
+        What to return: cells in the order of Eq. 8, the N intervals, and last a column of ones.
 
     Returns
     -------
-    ndarray, shape (rows wanted, N (N + 1) / 2 + N)
+    ndarray, shape (rows wanted, C)
 
     """
     levels = len(nodes) - 1
     cells = levels * (levels + 1) // 2
-    result = np.empty((np.sum(wanted), cells + levels))
+    lower, upper = np.empty(cells, dtype=np.int64), np.empty(cells, dtype=np.int64)
+    cell = 0
+    for i in range(levels):
+        for j in range(i, levels):
+            lower[cell], upper[cell] = i, j
+            cell += 1
+    width = nodes[1:] - nodes[:-1]
     height, length = np.empty(levels), np.empty(levels)
+    result = np.empty((len(scale), len(columns)))
     row = begin = 0
     for end in ends:
         parents, corners = branches(inputs[begin:end], nodes[0])
+        # A corner is an earlier input, whose row is needed, too.
         needed = wanted[begin:end].copy()
         for n in range(end - begin - 1, -1, -1):
             if needed[n] and parents[n] >= 0:
                 needed[parents[n]] = True
-        up = np.empty((np.sum(needed), cells))
-        place = np.zeros(end - begin, dtype=np.int64)
-        used = 0
+        up = np.zeros((np.sum(needed), len(columns)))
+        place = np.cumsum(needed) - 1
         for n in range(end - begin):
             if not needed[n]:
                 continue
-            u, corner, parent = inputs[begin + n], corners[n], parents[n]
+            u, corner, parent, here = inputs[begin + n], corners[n], parents[n], place[n]
             side = 2.0 if u >= corner else -2.0
             alpha, beta = max(u, corner), min(u, corner)
             for k in range(levels):
-                width = nodes[k + 1] - nodes[k]
-                height[k] = min(max(alpha - nodes[k], 0.0), width) / width
-                length[k] = min(max(nodes[k + 1] - beta, 0.0), width) / width
-            cell = 0
-            for i in range(levels):
-                # The triangle between corner and input; a cell on the diagonal is half a square.
-                overlap = min(max(height[i] + length[i] - 1.0, 0.0), 1.0)
-                up[used, cell] = side * overlap * overlap
-                for j in range(i + 1, levels):
-                    up[used, cell + j - i] = side * length[i] * height[j]
-                cell += levels - i
+                height[k] = min(max(alpha - nodes[k], 0.0), width[k]) / width[k]
+                length[k] = min(max(nodes[k + 1] - beta, 0.0), width[k]) / width[k]
             if parent >= 0:
-                # A corner is an earlier input.
-                for cell in range(cells):
-                    up[used, cell] += up[place[parent], cell]
+                up[here] = up[place[parent]]
+            for c in range(len(columns)):
+                cell = columns[c]
+                if cell < cells:
+                    i, j = lower[cell], upper[cell]
+                    if i < j:
+                        up[here, c] += side * length[i] * height[j]
+                    else:
+                        # The triangle between corner and input; such a cell is half a square.
+                        overlap = min(max(height[i] + length[i] - 1.0, 0.0), 1.0)
+                        up[here, c] += side * overlap * overlap
+                elif cell < cells + levels:
+                    k = cell - cells
+                    up[here, c] = 2.0 * min(max(u - nodes[k], 0.0), width[k]) / width[k]
+                else:
+                    up[here, c] = 1.0
             if wanted[begin + n]:
-                for cell in range(cells):
-                    result[row, cell] = up[used, cell]
-                for k in range(levels):
-                    width = nodes[k + 1] - nodes[k]
-                    result[row, cells + k] = 2.0 * min(max(u - nodes[k], 0.0), width) / width
+                for c in range(len(columns)):
+                    result[row, c] = up[here, c]
+                    if columns[c] < cells + levels:
+                        result[row, c] *= scale[row]
                 row += 1
-            place[n] = used
-            used += 1
         begin = end
     return result
