@@ -6,6 +6,8 @@ import argparse
 import json
 import sys
 
+import numpy as np
+
 from hysteresis_ros.atomic import write_text
 from hysteresis_ros.cli.outputs import InputPath, OutputFile, OutputFileOrStdout
 from hysteresis_ros.errors import MeasurementError
@@ -185,6 +187,21 @@ def write_json(path, content):
         print(text)
     else:
         write_text(path, text + '\n')
+
+
+def warn(text):
+    """Print a warning of one line on standard error, if there is anything to say."""
+    if text:
+        print(f'hysteresis: warning: {one_line(text)}', file=sys.stderr)
+
+
+def warn_of_loads(model, measurements):
+    """Say where runs of an arm leave the loads that the model was identified under."""
+    from hysteresis_ros.report.words import load_in_words
+
+    angles = [m.column('angle') for m in measurements if m.response == 'angle']
+    if angles:
+        warn(load_in_words(model, np.concatenate(angles)))
 
 
 def say(args, text):

@@ -3,12 +3,11 @@
 """`hysteresis compare`: model against measurement."""
 
 from pathlib import Path
-import sys
 
 from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, one_line, read_all, say, Steps,
-    write_json)
+    add_data, add_json, add_model, add_report, add_settled, read_all, say, Steps, warn,
+    warn_of_loads, write_json)
 from hysteresis_ros.cli.outputs import OutputFolder
 
 
@@ -42,7 +41,8 @@ def run(args):
     steps.clear()
     for note in comparison.warnings:
         if note not in known:
-            print(f'hysteresis: warning: {one_line(note)}', file=sys.stderr)
+            warn(note)
+    warn_of_loads(model, measurements)
     say(args, comparison.to_text())
     if args.plots:
         Path(args.plots).mkdir(parents=True, exist_ok=True)

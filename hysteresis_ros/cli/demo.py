@@ -154,7 +154,7 @@ def bench_model(args, folder):
     model.save(folder / 'model.yaml')
     say(args, 'Bench identified: ' + ', '.join(
         f'{name} {part} {values[part]["model"]["mean_percent"]:.2f} %'
-        for name, values in model.metrics.items() for part in values))
+        for name, values in model.metrics.items() for part in values if 'model' in values[part]))
     return model
 
 

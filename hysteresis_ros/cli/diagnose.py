@@ -3,7 +3,8 @@
 """`hysteresis diagnose`: which physical effect the model is missing."""
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, write_json)
+    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, warn_of_loads,
+    write_json)
 
 UNITS = {'angle': (57.29577951308232, 'deg'), 'length': (1e3, 'mm'), 'strain': (100.0, '%'),
          'force': (1.0, 'N')}
@@ -37,6 +38,7 @@ def run(args):
     measurements = read_all(args.data, args.namespace, args.settled)
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed,
                      progress=lambda items, total: progress(items, 'effects', total))
+    warn_of_loads(model, measurements)
     say(args, to_text(found, measurements[-1].response))
     if args.json:
         from hysteresis_ros.comparison.compare import compare

@@ -3,7 +3,7 @@
 """`hysteresis identify`: from bench tables to a model."""
 
 from hysteresis_ros.cli.common import (
-    add_json, numbers, progress, read_all, say, Steps, write_json)
+    add_json, numbers, progress, read_all, say, Steps, warn, write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.errors import MeasurementError, ParameterError
 
@@ -44,6 +44,8 @@ def run(args):
     """Do it."""
     from hysteresis_ros.bicep import BicepGeometry
     from hysteresis_ros.identification.bench import identify
+    from hysteresis_ros.model.loads import reached_angles
+    from hysteresis_ros.report.words import load_in_words
 
     if args.force is None and args.length is None:
         raise ParameterError('nothing to identify; give --length, --force or both')
@@ -61,6 +63,8 @@ def run(args):
         model, added = with_effects(args, model, force, length)
     model.save(args.output)
     say(args, report(model, found, added))
+    if geometry is not None and model.response == 'length':
+        warn(load_in_words(model, reached_angles(model)))
     say(args, f'\nWritten to {args.output}')
     if args.json:
         write_json(args.json, {

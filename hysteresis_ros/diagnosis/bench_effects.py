@@ -64,7 +64,10 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
         return model, []
     extended, added = extended_model(model, names, [fitted])
     metrics = measure(extended, force, force_trials, length, length_trials)
-    return dataclasses.replace(extended, metrics={**extended.metrics, **metrics}), added
+    # What was left out of the last fit of the weights stays beside the new errors.
+    for name, entry in metrics.items():
+        metrics[name] = {**extended.metrics.get(name, {}), **entry}
+    return dataclasses.replace(extended, metrics=metrics), added
 
 
 def _with_universal(model, found, fitted):

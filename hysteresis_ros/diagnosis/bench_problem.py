@@ -14,6 +14,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import SensorEffect
 from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.identification.bench import left_out
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
 from hysteresis_ros.identification.operators import smoothness
 from hysteresis_ros.identification.projection import ProjectedWeights
@@ -320,7 +321,10 @@ class BenchProblem(Problem):
             best = fit, design
         fit, design = best
         stage = _stage(design.nodes, fit.weights, fit.bias)
-        return dataclasses.replace(self.model, effects=list(effects), length_stage=stage)
+        metrics = dict(self.model.metrics)
+        metrics['length'] = {**metrics.get('length', {}), **left_out(fit, self.trial)}
+        return dataclasses.replace(
+            self.model, effects=list(effects), length_stage=stage, metrics=metrics)
 
 
 def _stage(nodes, weights, bias):

@@ -176,6 +176,9 @@ def identify(length=None, force=None, *, force_trials=None, length_trials=None, 
         length and length.where(_fitted_rows(length, length_trials, length_rows)),
         force and force.where(choose_trials(force, force_trials, 'force')))
     model.metrics = measure(model, force, force_trials, length, length_trials)
+    if length_fit is not None:
+        groups = length.column('trial')[_fitted_rows(length, length_trials, length_rows)]
+        model.metrics['length'].update(left_out(length_fit, groups))
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit)
 
@@ -322,6 +325,27 @@ def measure(model, force, force_trials, length, length_trials):
     return metrics
 
 
+def left_out(fit: WeightFit, groups: np.ndarray) -> dict:
+    """
+    Return the metric of trials, mostly of other loads, that were left out of the fit.
+
+    Parameters
+    ----------
+    fit : WeightFit
+        Of H2.
+    groups : ndarray, shape (n,)
+        Trial of each row fitted.
+
+    Returns
+    -------
+    dict
+        'left_out', or nothing where there is one trial or none was left out.
+    """
+    if len(np.unique(groups)) < 2 or not np.isfinite(fit.held_out_rmse):
+        return {}
+    return {'left_out': {'rmse': fit.held_out_rmse}}
+
+
 def _provenance(force, force_trials, length, length_trials):
     entries = {'hysteresis_ros': __version__, 'numpy': np.__version__}
     for name, measurement, trials in (('force', force, force_trials),
@@ -332,4 +356,9 @@ def _provenance(force, force_trials, length, length_trials):
                 'source': str(measurement.source).rsplit('/', 1)[-1],
                 'sha256': measurement.digest,
                 'trials': sorted({float(t) for t in measurement.column('trial')[rows]})}
+    if length is not None and length.load is not None:
+        # The force table may share its unit, so that the range of the load would say nothing.
+        rows, load = choose_trials(length, length_trials, 'length'), length.column(length.load)
+        entries['length']['loads'] = [
+            float(np.mean(load[part])) for _, part in _parts(length, rows)]
     return entries
