@@ -18,6 +18,7 @@ FOLLOWED_STARTS, WORTH_FOLLOWING, FIRST_EVALUATIONS = 2, 2.0, 4
 # Decimals, in parts of the response's variance, to which errors of starts without effect agree.
 SAME = 9
 MOST_EVALUATIONS, HELD_OUT_EVALUATIONS = 8, 3
+TOLERANCE = 1e-3
 
 
 class BenchFitter:
@@ -34,7 +35,8 @@ class BenchFitter:
         self.problem = problem
         self.fixed = list(problem.model.effects)
 
-    def fit(self, effects, rows=None, evaluations: int = MOST_EVALUATIONS) -> Fit:
+    def fit(self, effects, rows=None, evaluations: int = MOST_EVALUATIONS,
+            tolerance: float = TOLERANCE) -> Fit:
         """
         Fit from the present values of `effects`, by least squares within their bounds.
 
@@ -46,6 +48,8 @@ class BenchFitter:
             Rows to fit; all by default.
         evaluations : int
             Steps of the optimiser at most.
+        tolerance : float
+            A step that lowers the sum of squares by a smaller share is the last.
         """
         problem, parameters = self.problem, ParameterVector(effects, self.problem.kind)
         kept = unaffected(self.fixed, effects)
@@ -81,7 +85,7 @@ class BenchFitter:
             np.clip(parameters.vector(), parameters.lower + inside, parameters.upper - inside),
             jac=lambda vector: derivatives(vector.tobytes())[chosen] / scale,
             bounds=(parameters.lower, parameters.upper), method='trf', x_scale=1.0,
-            xtol=1e-3, ftol=1e-3, gtol=1e-8, max_nfev=evaluations)
+            xtol=1e-3, ftol=tolerance, gtol=1e-8, max_nfev=evaluations)
         return Fit(parameters.with_vector(found.x), found.x, response(found.x),
                    derivatives(found.x.tobytes()))
 

@@ -251,8 +251,7 @@ class BenchProblem(Problem):
         """
         Return the response for effects that differ a little from those of a solution.
 
-        To first order in the weights; those that are zero stay so, and the martensite share that
-        effects may look at stays as it is.
+        Weights that are zero stay so, and so does the martensite share that effects may look at.
 
         Parameters
         ----------

@@ -17,7 +17,8 @@ from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.workers import one_blas_thread
 
-EVALUATIONS = 30
+# Of the last fit, whose values are kept.
+EVALUATIONS, TOLERANCE = 30, 1e-4
 
 
 @dataclasses.dataclass
@@ -167,7 +168,7 @@ def _on_bench(problem, model, classes) -> list:
             fits.append(fitter.fit(usual([*known, effect], problem.kind)))
         fit = min(fits, key=lambda one: fitter.error(one.predicted))
         if number == len(classes):
-            fit = fitter.fit(fit.effects, evaluations=EVALUATIONS)
+            fit = fitter.fit(fit.effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
         known = fit.effects
         found.append((fitter.with_intervals(fit), fit.implausible()))
     return found

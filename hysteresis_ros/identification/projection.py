@@ -4,14 +4,13 @@
 Weights eliminated from a fit: best ones for given rows, and how they follow when the rows move.
 
 Where rows depend on parameters that are not weights, the weights are a function of those
-parameters (variable projection: Golub and Pereyra 1973). Its derivative, with the weights that are
-at their bound staying there, takes one triangular solve with the factor that the fit left behind.
+parameters (variable projection: Golub and Pereyra 1973). For its derivatives the weights that are
+at their bound stay there, so that each takes one small linear problem instead of a constrained one.
 """
 
 import numpy as np
-from scipy.linalg import lapack
 
-from hysteresis_ros.identification.nonnegative import solve_nonnegative
+from hysteresis_ros.identification.nonnegative import solve, solve_nonnegative
 
 
 class ProjectedWeights:
@@ -40,16 +39,14 @@ class ProjectedWeights:
                  start: np.ndarray | None = None):
         free = np.zeros(design.shape[1], dtype=bool)
         free[-1] = True
-        self._gram = design.T @ design / len(target) + penalty
         self.z, self.passive = solve_nonnegative(
-            self._gram, design.T @ target / len(target), free, start)
+            design.T @ design / len(target) + penalty, design.T @ target / len(target), free, start)
         self.columns = np.flatnonzero(self.passive)
         self._penalty = penalty[np.ix_(self.columns, self.columns)]
-        self._factor: np.ndarray | None = None
 
     def moved(self, design: np.ndarray, target: np.ndarray) -> np.ndarray:
         """
-        Return the weights for rows that differ a little, to first order.
+        Return the weights for rows that differ a little.
 
         Parameters
         ----------
@@ -60,9 +57,7 @@ class ProjectedWeights:
         Returns
         -------
         ndarray, shape (P,)
+            Of any sign.
         """
-        if self._factor is None:
-            self._factor, _ = lapack.dpotrf(self._gram[np.ix_(self.columns, self.columns)])
-        z = self.z[self.columns]
-        slope = design.T @ (target - design @ z) / len(target) - self._penalty @ z
-        return z + lapack.dpotrs(self._factor, slope)[0]
+        return solve(design.T @ design / len(target) + self._penalty,
+                     design.T @ target / len(target))
