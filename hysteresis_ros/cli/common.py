@@ -6,11 +6,16 @@ import argparse
 from collections.abc import Iterable, Mapping, Sequence
 import json
 import sys
-from typing import Any, TextIO, TypeVar
+from typing import Any, TextIO, TYPE_CHECKING, TypeVar
+
+import numpy as np
 
 from hysteresis_ros.atomic import AnyPath, write_text
 from hysteresis_ros.cli.outputs import InputPath, OutputFile, OutputFileOrStdout
 from hysteresis_ros.measurements import Measurement, read_measurement
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import MuscleModel
 
 Item = TypeVar('Item')
 # What `ArgumentParser.add_subparsers` returns; argparse has no public name for it.
@@ -181,6 +186,21 @@ def write_json(path: str, content: Mapping[str, Any]) -> None:
         print(text)
     else:
         write_text(path, text + '\n')
+
+
+def warn(text: str) -> None:
+    """Print a warning of one line on standard error, if there is anything to say."""
+    if text:
+        print(f'hysteresis: warning: {one_line(text)}', file=sys.stderr)
+
+
+def warn_of_loads(model: 'MuscleModel', measurements: Sequence[Measurement]) -> None:
+    """Say where runs of an arm leave the loads that the model was identified under."""
+    from hysteresis_ros.report.words import load_in_words
+
+    angles = [m.column('angle') for m in measurements if m.response == 'angle']
+    if angles:
+        warn(load_in_words(model, np.concatenate(angles)))
 
 
 def say(args: argparse.Namespace, text: str) -> None:

@@ -6,13 +6,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-import sys
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, one_line, read_all, say, Steps,
-    Subparsers, write_json)
+    add_data, add_json, add_model, add_report, add_settled, read_all, say, Steps, Subparsers, warn,
+    warn_of_loads, write_json)
 from hysteresis_ros.cli.outputs import OutputFolder
 
 if TYPE_CHECKING:
@@ -49,7 +48,8 @@ def run(args: argparse.Namespace) -> None:
     steps.clear()
     for note in comparison.warnings:
         if note not in known:
-            print(f'hysteresis: warning: {one_line(note)}', file=sys.stderr)
+            warn(note)
+    warn_of_loads(model, measurements)
     say(args, comparison.to_text())
     if args.plots:
         Path(args.plots).mkdir(parents=True, exist_ok=True)

@@ -164,7 +164,7 @@ def bench_model(args: argparse.Namespace, folder: Path) -> MuscleModel:
     model.save(folder / 'model.yaml')
     say(args, 'Bench identified: ' + ', '.join(
         f'{name} {part} {values[part]["model"]["mean_percent"]:.2f} %'
-        for name, values in model.metrics.items() for part in values))
+        for name, values in model.metrics.items() for part in values if 'model' in values[part]))
     return model
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
     add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, Subparsers,
-    write_json)
+    warn_of_loads, write_json)
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.verdict import Diagnosis
@@ -46,6 +46,7 @@ def run(args: argparse.Namespace) -> None:
     measurements = read_all(args.data, args.namespace, args.settled)
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed,
                      progress=lambda items, total: progress(items, 'effects', total))
+    warn_of_loads(model, measurements)
     say(args, to_text(found, measurements[-1].response))
     if args.json:
         write_json(args.json, found.to_dict())

@@ -9,7 +9,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_json, numbers, progress, say, Steps, Subparsers, write_json)
+    add_json, numbers, progress, say, Steps, Subparsers, warn, write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.errors import ParameterError
 
@@ -52,6 +52,8 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.api import identify
+    from hysteresis_ros.model.loads import reached_angles
+    from hysteresis_ros.report.words import load_in_words
 
     if args.force is None and args.length is None:
         raise ParameterError('nothing to identify; give --length, --force or both')
@@ -65,6 +67,8 @@ def run(args: argparse.Namespace) -> None:
     steps.clear()
     found.model.save(args.output)
     say(args, report(found))
+    if found.model.geometry is not None and found.model.response == 'length':
+        warn(load_in_words(found.model, reached_angles(found.model)))
     say(args, f'\nWritten to {args.output}')
     if args.json:
         write_json(args.json, {'model': args.output, **found.to_dict()})

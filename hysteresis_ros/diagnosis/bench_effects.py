@@ -8,7 +8,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.diagnosis.extend import extend
+from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
@@ -62,10 +62,12 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
         names = _with_universal(model, found, fitted)
     if not names:
         return model, []
-    extension = extend(model, names, [fitted])
-    metrics = measure(extension.model, force, force_trials, length, length_trials)
-    metrics = {**extension.model.metrics, **metrics}
-    return dataclasses.replace(extension.model, metrics=metrics), extension.added
+    extended, added = extended_model(model, names, [fitted])
+    metrics = measure(extended, force, force_trials, length, length_trials)
+    # What was left out of the last fit of the weights stays beside the new errors.
+    for name, entry in metrics.items():
+        metrics[name] = {**extended.metrics.get(name, {}), **entry}
+    return dataclasses.replace(extended, metrics=metrics), added
 
 
 def _with_universal(model, found, fitted):

@@ -3,6 +3,7 @@
 """Fit the parameters of effects to bench tables, and test the fit on rows that were held out."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from scipy import optimize, stats
@@ -17,6 +18,7 @@ FOLLOWED_STARTS, WORTH_FOLLOWING, FIRST_EVALUATIONS = 2, 2.0, 4
 # Decimals, in parts of the response's variance, to which errors of starts without effect agree.
 SAME = 9
 MOST_EVALUATIONS, HELD_OUT_EVALUATIONS = 8, 3
+TOLERANCE = 1e-3
 
 
 class BenchFitter:
@@ -33,7 +35,8 @@ class BenchFitter:
         self.problem = problem
         self.fixed = list(problem.model.effects)
 
-    def fit(self, effects, rows=None, evaluations: int = MOST_EVALUATIONS) -> Fit:
+    def fit(self, effects, rows=None, evaluations: int = MOST_EVALUATIONS,
+            tolerance: float = TOLERANCE) -> Fit:
         """
         Fit from the present values of `effects`, by least squares within their bounds.
 
@@ -45,29 +48,34 @@ class BenchFitter:
             Rows to fit; all by default.
         evaluations : int
             Steps of the optimiser at most.
+        tolerance : float
+            A step that lowers the sum of squares by a smaller share is the last.
         """
         problem, parameters = self.problem, ParameterVector(effects, self.problem.kind)
         kept = unaffected(self.fixed, effects)
         chosen = np.ones(len(problem.measured), dtype=bool) if rows is None else rows
-        cache: dict[bytes, np.ndarray] = {}
+
+        @functools.cache
+        def solved(key):
+            vector = np.frombuffer(key)
+            return problem.solve(kept + parameters.with_vector(vector), rows)
 
         def response(vector):
-            key = np.asarray(vector).tobytes()
-            if key not in cache:
-                cache[key] = problem.simulate(kept + parameters.with_vector(vector), rows)
-            return cache[key]
+            return solved(np.asarray(vector).tobytes()).predicted
 
         if len(parameters) == 0:
             predicted = response(np.zeros(0))
             return Fit(list(effects), np.zeros(0), predicted, np.zeros((len(predicted), 0)))
 
-        def derivatives(vector):
-            columns = []
+        @functools.cache
+        def derivatives(key):
+            vector, columns = np.frombuffer(key), []
             for index, value in enumerate(vector):
                 step = DIFFERENCE if value + DIFFERENCE < parameters.upper[index] else -DIFFERENCE
                 moved = np.array(vector)
                 moved[index] += step
-                columns.append((response(moved) - response(vector)) / step)
+                near = problem.near(solved(key), kept + parameters.with_vector(moved), rows)
+                columns.append((near - solved(key).predicted) / step)
             return np.column_stack(columns)
 
         scale = max(float(np.std(problem.measured)), 1e-12)
@@ -75,11 +83,11 @@ class BenchFitter:
         found = optimize.least_squares(
             lambda vector: (response(vector) - problem.measured)[chosen] / scale,
             np.clip(parameters.vector(), parameters.lower + inside, parameters.upper - inside),
-            jac=lambda vector: derivatives(vector)[chosen] / scale,
+            jac=lambda vector: derivatives(vector.tobytes())[chosen] / scale,
             bounds=(parameters.lower, parameters.upper), method='trf', x_scale=1.0,
-            xtol=1e-3, ftol=1e-3, gtol=1e-8, max_nfev=evaluations)
+            xtol=1e-3, ftol=tolerance, gtol=1e-8, max_nfev=evaluations)
         return Fit(parameters.with_vector(found.x), found.x, response(found.x),
-                   derivatives(found.x))
+                   derivatives(found.x.tobytes()))
 
     def search(self, known, effect) -> Fit:
         """

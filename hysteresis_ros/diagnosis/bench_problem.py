@@ -14,15 +14,19 @@ import numpy as np
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import SensorEffect
 from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.identification.least_squares import SLACK, fit_weights, quick_weights
-from hysteresis_ros.identification.operators import preisach_rows, smoothness
+from hysteresis_ros.identification.bench import left_out
+from hysteresis_ros.identification.least_squares import SLACK, fit_weights
+from hysteresis_ros.identification.operators import smoothness
+from hysteresis_ros.identification.projection import ProjectedWeights
+from hysteresis_ros.kernels.shares import shares
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.simulation import turning_rows
 from hysteresis_ros.operators import Preisach, cell_areas
 
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
 # the solution is unique. More of it bends the effects' own parameters.
 SEARCH_STRENGTH = 1e-8
+# Courses that are remembered, those of the latest effects.
+MOST_COURSES = 20
 # How often weights and the martensite share that they show are fitted to each other.
 PHASE_PASSES = 2
 # A finer grid has to lower the held-out error by this share.
@@ -33,25 +37,44 @@ FINER = 1.0, 1.5, 2.0
 
 @dataclasses.dataclass
 class Design:
-    """The least squares problem of H2's weights: areas (n, K), known part (n,), grid nodes."""
+    """
+    The least squares problem of H2's weights.
 
-    rows: np.ndarray
+    `shares` (n, K + 1) say what each weight, times the size of its cell, and last the bias
+    contribute to the response; `known` (n,) is the part without weights.
+    """
+
+    shares: np.ndarray
     known: np.ndarray
     nodes: np.ndarray
+
+    @property
+    def rows(self) -> np.ndarray:
+        """What each weight contributes to the response, shape (n, K)."""
+        return self.shares[:, :-1] * _scale(self.nodes)
+
+
+@dataclasses.dataclass
+class Solution:
+    """Effects with the weights that suit the training rows best, and what both predict (n,)."""
+
+    weights: ProjectedWeights
+    predicted: np.ndarray
+    phases: list | None
 
 
 @dataclasses.dataclass
 class Course:
     """
-    What H2 is given in each trial, and what is done to its output.
+    What H2 is given, trial after trial, and what is done to its output.
 
-    `inputs` (rows + 1,) begin with the cold one; `scales` and `known` (rows,) multiply the output
-    above its least and are added to it.
+    `inputs` (rows + trials,) begin each trial with the cold one; `scales` and `known` (rows,)
+    multiply the output above its least and are added to it.
     """
 
-    inputs: list
-    scales: list
-    known: list
+    inputs: np.ndarray
+    scales: np.ndarray
+    known: np.ndarray
 
 
 class BenchProblem(Problem):
@@ -67,61 +90,80 @@ class BenchProblem(Problem):
                                    f'model has a {stage.kind} one; identify it with --operator '
                                    'two-stage or preisach')
         self.levels = len(stage.nodes) - 1
-        self._passive = None
+        self._trials = [trial for simulator in self.simulators for trial in simulator.trials]
+        counts = np.array([len(trial.drive) for trial in self._trials])
+        # Before its first row each trial has the cold one, with that row's load.
+        self._ends = np.cumsum(counts + 1)
+        rows = np.arange(counts.sum())
+        self._felt = np.insert(rows, np.cumsum(counts) - counts, np.cumsum(counts) - counts)
+        self._load = np.concatenate([trial.load for trial in self._trials])
+        begins = np.cumsum([0] + [simulator.measurement.rows for simulator in self.simulators])
+        self._judged = np.concatenate(
+            [begin + chosen for begin, chosen in zip(begins, self.chosen)])
+        self._wanted = np.zeros(self._ends[-1], dtype=bool)
+        self._wanted[self._judged + np.repeat(np.arange(1, len(counts) + 1), counts)[
+            self._judged]] = True
+        self._passive = {}
+        self._courses = {}
         self._square = None
         self._phases_of = self._known_phases = None
 
-    def _design(self, effects, levels=None, train=None, phases=None) -> Design:
-        chain = Chain(effects, self.model.surroundings)
-        if chain.needs_phase and phases is None:
+    def _design(self, effects, levels=None, train=None, phases=None, columns=None) -> Design:
+        if phases is None and any(effect.needs_phase for effect in effects):
             phases = self._phases(effects, train)
-        course = self._course(chain, phases)
+        course = self._course(effects, phases)
         nodes = self._nodes(course, levels or self.levels)
-        picked = self._picked()
-        rows = np.concatenate([
-            _areas(nodes, part, keep) for part, keep in zip(course.inputs, picked)])
-        rows *= np.concatenate(
-            [scale[keep] for scale, keep in zip(course.scales, picked)])[:, None]
-        return Design(rows, np.concatenate(
-            [value[keep] for value, keep in zip(course.known, picked)]), nodes)
+        scale, known = (column[self._judged] for column in (course.scales, course.known))
+        if columns is None:
+            columns = np.arange(len(_scale(nodes)) + 1)
+        rows = shares(nodes, course.inputs, self._ends, self._wanted, scale, columns)
+        return Design(rows, known, nodes)
 
-    def _course(self, chain, phases) -> Course:
-        model = self.model
-        first = model.first_stage(chain)
+    def _course(self, effects, phases) -> Course:
+        key = tuple((effect.id, *effect.values.values()) for effect in effects)
+        if phases is not None or key not in self._courses:
+            course = self._new_course(Chain(effects, self.model.surroundings), phases)
+            if phases is not None:
+                return course
+            # Folds that are held out in turn begin at the same effects.
+            self._courses[key] = course
+            if len(self._courses) > MOST_COURSES:
+                del self._courses[next(iter(self._courses))]
+        return self._courses[key]
+
+    def _new_course(self, chain, phases) -> Course:
+        model, first, load = self.model, self.model.first_stage(chain), self._load
         cold = chain.to_heat(model.cold_drive)
-        course = Course([], [], [])
-        for number, trial in enumerate(self._trials()):
+        heats, drifts = [], []
+        for number, trial in enumerate(self._trials):
             inputs = trial.inputs
             if phases is not None:
                 inputs = inputs._replace(phase=phases[number])
             heat = chain.heat(trial.drive, inputs)
-            first.reset()
-            x = first.simulate(np.concatenate(([cold], heat)))
-            load = chain.load_inside(trial.load) if first.loaded else 0.0 * trial.load
-            course.inputs.append(model.sign * (x - np.concatenate((load[:1], load))))
-            offset, factor = chain.drift(trial.drive, heat, inputs)
-            course.scales.append(chain.scale(trial.load) * factor)
-            course.known.append(chain.stretch(trial.load) + offset)
-        return course
+            heats += [[cold], heat]
+            if chain.drifts:
+                drifts.append(chain.drift(trial.drive, heat, inputs))
+        x = self._first(first, np.concatenate(heats))
+        if first.loaded:
+            x -= chain.load_inside(load)[self._felt]
+        offset, factor = np.concatenate(drifts, axis=1) if drifts else (0.0, 1.0)
+        return Course(model.sign * x, chain.scale(load) * factor + 0.0 * load,
+                      chain.stretch(load) + offset)
 
-    def _trials(self) -> list:
-        return [trial for simulator in self.simulators for trial in simulator.trials]
+    def _first(self, first, heat):
+        """Return x for the heat of all trials, each from the cold state."""
+        x, begin = np.empty(len(heat)), 0
+        for end in self._ends:
+            first.reset()
+            x[begin:end] = first.simulate(heat[begin:end])
+            begin = end
+        return x
 
     @staticmethod
     def _nodes(course, levels):
-        low = min(part.min() for part in course.inputs)
-        high = max(part.max() for part in course.inputs)
+        low, high = course.inputs.min(), course.inputs.max()
         margin = 1e-6 * max(high - low, 1e-12)
         return np.linspace(low - margin, high + margin, levels + 1)
-
-    def _picked(self) -> list:
-        """Judged rows of each trial, counted from the trial's first."""
-        picked = []
-        for simulator, chosen in zip(self.simulators, self.chosen):
-            for trial in simulator.trials:
-                inside = (chosen >= trial.rows.start) & (chosen < trial.rows.stop)
-                picked.append(chosen[inside] - trial.rows.start)
-        return picked
 
     def _phases(self, effects, train) -> list:
         """
@@ -135,8 +177,9 @@ class BenchProblem(Problem):
                *((effect.id, *effect.values.items()) for effect in effects))
         if key != self._phases_of:
             design = self._design(effects, train=train)
-            weights, _ = self._weights(design, train)
-            self._known_phases = self._phases_with(effects, _stage(design.nodes, weights, 0.0))
+            z = self._projected(design, train).z
+            self._known_phases = self._phases_with(
+                effects, _stage(design.nodes, z[:-1] / _scale(design.nodes), 0.0))
             self._phases_of = key
         return self._known_phases
 
@@ -144,7 +187,8 @@ class BenchProblem(Problem):
         """Return the martensite share that H2 shows in every row of each trial."""
         model = dataclasses.replace(self.model, length_stage=stage)
         found = []
-        for part in self._course(Chain(effects, model.surroundings), phases).inputs:
+        inputs = self._course(effects, phases).inputs
+        for part in np.split(inputs, self._ends[:-1]):
             stage.reset()
             stage.step(part[0])
             found.append(model.martensite(stage.simulate(part[1:])))
@@ -183,27 +227,69 @@ class BenchProblem(Problem):
 
     def simulate(self, effects, train=None) -> np.ndarray:
         """Return the response of the judged rows, shape (n,), weights fitted to `train` (n,)."""
-        design = self._design(effects, train=train)
-        weights, bias = self._weights(design, train)
-        response = design.rows @ weights + bias + design.known
+        return self.solve(effects, train).predicted
+
+    def solve(self, effects, train=None) -> Solution:
+        """
+        Fit H2's weights beside effects.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        train : ndarray of bool, shape (n,), optional
+            Rows to fit; all by default.
+        """
+        phases = None
+        if any(effect.needs_phase for effect in effects):
+            phases = self._phases(effects, train)
+        design = self._design(effects, phases=phases)
+        weights = self._projected(design, train)
+        return Solution(weights, self._response(effects, design, weights.z), phases)
+
+    def near(self, solution, effects, train=None) -> np.ndarray:
+        """
+        Return the response for effects that differ a little from those of a solution.
+
+        Weights that are zero stay so, and so does the martensite share that effects may look at.
+
+        Parameters
+        ----------
+        solution : Solution
+        effects : sequence of Effect
+            The same effects with other values.
+        train : ndarray of bool, shape (n,), optional
+            The rows that the solution was fitted to.
+        """
+        design = self._design(effects, phases=solution.phases, columns=solution.weights.columns)
+        z = solution.weights.moved(*self._rows(design, train))
+        return self._response(effects, design, z)
+
+    def _response(self, effects, design, z):
+        response = design.shares @ z + design.known
         for effect in effects:
             if isinstance(effect, SensorEffect):
                 response = self._sensed(effect, response)
         return response
 
-    def _weights(self, design, train):
-        rows = slice(None) if train is None else train
+    def _rows(self, design, train):
+        """Return design and target of the training rows."""
+        target = self.measured - design.known
+        return (design.shares, target) if train is None else (design.shares[train], target[train])
+
+    def _projected(self, design, train):
         # Neighbouring parameters have neighbouring weights.
-        weights, bias, self._passive = quick_weights(
-            design.rows[rows], (self.measured - design.known)[rows],
-            _scale(design.nodes), self._penalty(design.nodes), self._passive)
-        return weights, bias
+        key = None if train is None else train.tobytes()
+        found = ProjectedWeights(*self._rows(design, train), self._penalty(design.nodes),
+                                 self._passive.get(key, self._passive.get(None)))
+        self._passive[key] = found.passive
+        return found
 
     def _penalty(self, nodes):
         """Square of the penalty; it is the same for all grids of equal intervals."""
         if self._square is None:
             root = smoothness(nodes, reversible=True)
-            self._square = SEARCH_STRENGTH * root.T @ root
+            self._square = np.pad(SEARCH_STRENGTH * root.T @ root, (0, 1))
         return self._square
 
     def _sensed(self, effect, response):
@@ -234,22 +320,16 @@ class BenchProblem(Problem):
             best = fit, design
         fit, design = best
         stage = _stage(design.nodes, fit.weights, fit.bias)
-        return dataclasses.replace(self.model, effects=list(effects), length_stage=stage)
+        metrics = dict(self.model.metrics)
+        metrics['length'] = {**metrics.get('length', {}), **left_out(fit, self.trial)}
+        return dataclasses.replace(
+            self.model, effects=list(effects), length_stage=stage, metrics=metrics)
 
 
 def _stage(nodes, weights, bias):
     """Return the operator with weights of shape (K + N,); `bias` is its least output."""
     count = len(cell_areas(nodes))
     return Preisach(nodes, weights[:count], bias + float(weights @ _scale(nodes)), weights[count:])
-
-
-def _areas(nodes, part, keep):
-    """Areas above saturation, (rows, K + N), of the kept rows; the first input is the cold one."""
-    wanted = np.zeros(len(part), dtype=bool)
-    wanted[keep + 1] = True
-    needed = wanted | turning_rows(part)
-    rows = preisach_rows(nodes, part[needed], reversible=True) + _scale(nodes)
-    return rows[wanted[needed]]
 
 
 def _scale(nodes):

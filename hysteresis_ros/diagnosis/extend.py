@@ -26,7 +26,8 @@ from hysteresis_ros.workers import one_blas_thread
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-EVALUATIONS = 30
+# Of the last fit, whose values are kept.
+EVALUATIONS, TOLERANCE = 30, 1e-4
 
 
 @dataclasses.dataclass(repr=False)
@@ -135,19 +136,12 @@ def extend(model, names, train, test=()) -> Extension:
     MeasurementError
         If the recordings do not fit together.
     """
-    classes = _checked(problem_for(model, [*train, *test]), names)
-    replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
-    base = model.with_effects([e for e in model.effects if e.id not in replaced])
-    problem = problem_for(base, train)
-    for kind in classes:
-        if problem.kind not in kind.kinds:
-            raise ParameterError(f'effect {kind.id} cannot be fitted to a {problem.kind} '
-                                 'measurement; give an arm run')
+    problem_for(model, [*train, *test])     # which refuses what does not fit together
+    problem, classes, fits = _fitted(model, names, train)
     judged = list(test) or list(train)
-    models, fits = [('base', model)], (
-        _on_bench if problem.refits else _on_arm)(problem, model, classes)
+    models = [('base', model)]
     for kind, (effects, _) in zip(classes, fits):
-        models.append((f'+ {kind.id}', problem.completed([*base.effects, *effects])))
+        models.append((f'+ {kind.id}', problem.completed([*problem.model.effects, *effects])))
     added, implausible = fits[-1]
     extended = _stamped(models[-1][1], added, train, problem.kind)
     models[-1] = (models[-1][0], extended)
@@ -161,6 +155,32 @@ def extend(model, names, train, test=()) -> Extension:
         return {'rmse_before': rmse(before, recordings), 'rmse_after': rmse(extended, recordings)}
     return Extension(extended, added, both(list(train)), both(list(test)), steps,
                      implausible, problem.response)
+
+
+@one_blas_thread()
+def extended_model(model, names, train) -> tuple:
+    """
+    Return the extended model and the effects added; `extend` also says what each of them gained.
+
+    The parameters, and what is raised, are those of `extend`.
+    """
+    problem, _, fits = _fitted(model, names, train)
+    added, _ = fits[-1]
+    completed = problem.completed([*problem.model.effects, *added])
+    return _stamped(completed, added, train, problem.kind), added
+
+
+def _fitted(model, names, train):
+    """Return the problem without the effects named, their classes, and the fit after each."""
+    classes = _checked(problem_for(model, train), names)
+    replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
+    base = model.with_effects([e for e in model.effects if e.id not in replaced])
+    problem = problem_for(base, train)
+    for kind in classes:
+        if problem.kind not in kind.kinds:
+            raise ParameterError(f'effect {kind.id} cannot be fitted to a {problem.kind} '
+                                 'measurement; give an arm run')
+    return problem, classes, (_on_bench if problem.refits else _on_arm)(problem, model, classes)
 
 
 def _checked(problem, names):
@@ -187,7 +207,7 @@ def _on_bench(problem, model, classes) -> list:
             fits.append(fitter.fit(usual([*known, effect], problem.kind)))
         fit = min(fits, key=lambda one: fitter.error(one.predicted))
         if number == len(classes):
-            fit = fitter.fit(fit.effects, evaluations=EVALUATIONS)
+            fit = fitter.fit(fit.effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
         known = fit.effects
         found.append((fitter.with_intervals(fit), fit.implausible()))
     return found

@@ -105,7 +105,7 @@ class Selection:
         return family.p_values(self.base.point, self.rng, self.settings.draws)
 
     def _worth_growing(self) -> bool:
-        """Whether the best set leaves more than its equations could, so that larger ones are due."""
+        """Whether the best set leaves more than its equations could: larger ones are due."""
         valid = self.valid()
         if not valid:
             return True
@@ -250,7 +250,6 @@ class Selection:
                     or (without and self._would_do(without, names))):
                 return False
         return True
-
 
     def _would_do(self, without, names) -> bool:
         """Whether a smaller set suffices and is not clearly less probable than the larger one."""

@@ -240,6 +240,9 @@ def identify(length: Measurement | None = None, force: Measurement | None = None
         length and length.where(_fitted_rows(length, length_trials, length_rows)),
         force and force.where(choose_trials(force, force_trials, 'force')))
     model.metrics = measure(model, force, force_trials, length, length_trials)
+    if length is not None and length_fit is not None:
+        groups = length.column('trial')[_fitted_rows(length, length_trials, length_rows)]
+        model.metrics['length'].update(left_out(length_fit, groups))
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit, force, length)
 
@@ -396,6 +399,27 @@ def measure(model: MuscleModel, force: Measurement | None, force_trials: Sequenc
     return metrics
 
 
+def left_out(fit: WeightFit, groups: np.ndarray) -> dict[str, Any]:
+    """
+    Return the metric of trials, mostly of other loads, that were left out of the fit.
+
+    Parameters
+    ----------
+    fit : WeightFit
+        Of H2.
+    groups : ndarray, shape (n,)
+        Trial of each row fitted.
+
+    Returns
+    -------
+    dict
+        'left_out', or nothing where there is one trial or none was left out.
+    """
+    if len(np.unique(groups)) < 2 or not np.isfinite(fit.held_out_rmse):
+        return {}
+    return {'left_out': {'rmse': fit.held_out_rmse}}
+
+
 def _provenance(force: Measurement | None, force_trials: Sequence[float] | None,
                 length: Measurement | None,
                 length_trials: Sequence[float] | None) -> dict[str, Any]:
@@ -408,4 +432,9 @@ def _provenance(force: Measurement | None, force_trials: Sequence[float] | None,
                 'source': str(measurement.source).rsplit('/', 1)[-1],
                 'sha256': measurement.digest,
                 'trials': sorted({float(t) for t in measurement.column('trial')[rows]})}
+    if length is not None and length.load is not None:
+        # The force table may share its unit, so that the range of the load would say nothing.
+        rows, load = choose_trials(length, length_trials, 'length'), length.column(length.load)
+        entries['length']['loads'] = [
+            float(np.mean(load[part])) for _, part in _parts(length, rows)]
     return entries

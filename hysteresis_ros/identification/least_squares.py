@@ -138,12 +138,13 @@ def fit_weights(
         raise IdentificationError('least squares: every strength must be a number above 0')
     if strength is not None:
         return problem.regularised(tried[0])
-    errors = problem.held_out_errors(tried)
+    fitted, path = problem.fitted_errors(tried)
+    errors = problem.held_out_errors(tried, path)
     validation = np.sqrt(np.mean(errors ** 2, axis=1))
     allowed = np.ones(len(tried), dtype=bool)
     if slack is not None:
-        fitted = problem.fitted_rmse(tried)
-        allowed = fitted <= fitted[0] + slack[0] + slack[1] * fitted[0]
+        rmse = np.sqrt(np.mean(fitted ** 2, axis=1))
+        allowed = rmse <= rmse[0] + slack[0] + slack[1] * rmse[0]
     best = int(np.argmin(np.where(allowed, validation, np.inf)))
     return problem.regularised(tried[best], tried, validation, errors[best])
 
@@ -229,28 +230,36 @@ class _Problem:
         noise = float(np.sqrt(np.sum(errors ** 2) / freedom))
         return self._result(x, passive, covariance, noise, 0.0, np.zeros(0), np.zeros(0))
 
-    def held_out_errors(self, strengths: np.ndarray) -> np.ndarray:
-        """Return the error of every row, held out with its fold, for ascending strengths (S, M)."""
+    def fitted_errors(self, strengths: np.ndarray) -> tuple[np.ndarray, list]:
+        """Return the error of every row of the fit for ascending strengths (S, M), and the path."""
+        path = self._path(strengths, np.ones(len(self.target), dtype=bool))
+        return np.array([self.design @ x - self.target for x, _ in path]), path
+
+    def held_out_errors(self, strengths: np.ndarray, path: list) -> np.ndarray:
+        """
+        Return the error of every row, held out with its fold, for ascending strengths (S, M).
+
+        `path` is that of the fit to all rows, near which those of the folds are.
+        """
         errors = np.empty((len(strengths), len(self.target)))
         for held in self.folds:
-            for k, x in enumerate(self._path(strengths, ~held)):
+            for k, (x, _) in enumerate(self._path(strengths, ~held, path)):
                 errors[k, held] = self.design[held] @ x - self.target[held]
         return errors
 
-    def fitted_rmse(self, strengths: np.ndarray) -> np.ndarray:
-        """Return the RMSE over the rows of the fit for ascending strengths, shape (S,)."""
-        everything = np.ones(len(self.target), dtype=bool)
-        return np.array([np.sqrt(np.mean((self.design @ x - self.target) ** 2))
-                         for x in self._path(strengths, everything)])
+    def _path(self, strengths: np.ndarray, rows: np.ndarray,
+              near: list | None = None) -> list[tuple[np.ndarray, np.ndarray]]:
+        """
+        Return solutions for some rows, each with its unknowns off their bound.
 
-    def _path(self, strengths: np.ndarray, rows: np.ndarray) -> list[np.ndarray]:
-        """Return the solutions for some rows; each starts from its stronger neighbour's."""
+        Each starts from its stronger neighbour's, or from the one of the same strength in `near`.
+        """
         curvature, passive, path = self.penalty.T @ self.penalty, None, []
         gram, moment = self._moments(rows)
-        for strength in strengths[::-1]:
-            x, passive = solve_nonnegative(
-                gram + strength * curvature, moment, self.free, passive)
-            path.append(x)
+        for k in reversed(range(len(strengths))):
+            x, passive = solve_nonnegative(gram + strengths[k] * curvature, moment, self.free,
+                                           passive if near is None else near[k][1])
+            path.append((x, passive))
         return path[::-1]
 
     def _moments(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -53,7 +53,7 @@ def solve_nonnegative(
         index = np.flatnonzero(passive)
         x = np.zeros(size)
         if len(index):
-            x[index] = _solve(gram[np.ix_(index, index)], moment[index])
+            x[index] = solve(gram[np.ix_(index, index)], moment[index])
         gradient = gram @ x - moment
         wrong = (passive & ~free & (x < -1e-12 * np.max(np.abs(x)))) | (
             ~passive & (gradient < -gradient_tolerance))
@@ -74,7 +74,8 @@ def solve_nonnegative(
         'least squares: no solution found; use a larger strength or fewer levels')
 
 
-def _solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
+def solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """Return the x with ``gram @ x = moment``; IdentificationError if not positive definite."""
     # LAPACK itself: for a problem this small the checks of scipy.linalg cost as much as its work.
     _, x, failed = lapack.dposv(gram, moment)
     if failed:

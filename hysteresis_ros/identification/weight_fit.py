@@ -64,6 +64,11 @@ class WeightFit:
     origin: np.ndarray
 
     @property
+    def held_out_rmse(self) -> float:
+        """RMSE of held-out rows at the strength chosen; NaN if nothing was held out."""
+        return float(np.append(self.validation[self.strengths == self.strength], np.nan)[0])
+
+    @property
     def mean_percent(self) -> float:
         """Mean absolute error in percent of the output range (Eq. 23)."""
         return float(100.0 * np.mean(np.abs(self.residual)) / self.output_range)

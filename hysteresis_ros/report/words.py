@@ -7,10 +7,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.model.loads import uncovered_load
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.verdict import Diagnosis
+    from hysteresis_ros.model import MuscleModel
 
 
 def verdict_in_words(found: Diagnosis) -> str:
@@ -55,6 +59,32 @@ def verdict_in_words(found: Diagnosis) -> str:
                 'missing.')
     return ("Adequate: no effect of the catalogue explains more than chance and the base model's "
             'own error.')
+
+
+def load_in_words(model: MuscleModel, theta: np.ndarray) -> str:
+    """
+    Say where the bench has not shown the muscle under the loads of an arm.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    theta : ndarray, shape (k,)
+        Angles [rad] that the arm takes.
+
+    Returns
+    -------
+    str
+        One sentence, empty if there is nothing to say.
+    """
+    found = uncovered_load(model, theta)
+    if found is None:
+        return ''
+    arm, bench, gap = found
+    where = (f"reaches into the gap between the bench's loads of {bench[0]:.1f} and "
+             f'{bench[1]:.1f} N' if gap else
+             f"lies beyond the bench's {bench[0]:.1f} to {bench[1]:.1f} N")
+    return (f"the arm's load of {arm[0]:.1f} to {arm[1]:.1f} N {where}: expect larger errors "
+            'there')
 
 
 def parameters_in_words(parameters: Mapping, intervals: bool = True) -> str:

@@ -1,0 +1,54 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the bench has shown the muscle under the loads that an arm puts on it."""
+
+import numpy as np
+
+# A load this share of the bench's range beyond its ends is as good as at an end.
+MARGIN = 0.02
+# Two neighbouring loads of the bench are far apart if every other gap is smaller by this factor.
+WIDE = 1.5
+
+
+def reached_angles(model) -> np.ndarray:
+    """Return angles [rad] of the arm at the lengths that the bench has shown, shape (k,)."""
+    low, high = model.require_geometry().angle_range
+    theta = model.geometry.angle(np.linspace(*model.ranges['length'], 100))
+    return theta[np.isfinite(theta) & (theta >= low) & (theta <= high)]
+
+
+def uncovered_load(model, theta) -> tuple | None:
+    """
+    Compare the load of an arm with those that the model was identified under.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    theta : ndarray, shape (k,)
+        Angles [rad] that the arm takes.
+
+    Returns
+    -------
+    (float, float), (float, float), bool, or None
+        The arm's least and largest load; the bench's, or those on either side of a gap of the bench
+        that the arm's load lies in; whether it is a gap. None if the bench covers the arm's load,
+        or where that is not known.
+    """
+    loads = np.unique(np.round(model.provenance.get('length', {}).get('loads', ()), 3))
+    known = model.geometry is not None and model.load_name == 'force' and len(loads) > 0
+    if not known or len(theta) == 0:
+        return None
+    low, high = model.geometry.angle_range
+    force = model.geometry.force(np.clip(theta, low, high))
+    arm = float(np.min(force)), float(np.max(force))
+    margin = MARGIN * max(loads[-1] - loads[0], loads[-1])
+    if arm[0] < loads[0] - margin or arm[1] > loads[-1] + margin:
+        return arm, (float(loads[0]), float(loads[-1])), False
+    gaps = np.diff(loads)
+    if len(gaps) < 2:
+        return None
+    widest = int(np.argmax(gaps))
+    below, above = float(loads[widest]), float(loads[widest + 1])
+    wide = gaps[widest] > WIDE * np.max(np.delete(gaps, widest))
+    inside = arm[0] < above - margin and arm[1] > below + margin
+    return (arm, (below, above), True) if wide and inside else None

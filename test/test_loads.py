@@ -1,0 +1,109 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a bench says of its own errors under other loads, and of loads that it has not seen."""
+
+import dataclasses
+
+from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.cli.main import main
+from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.discrepancy import length_error
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.laboratory.experiments import experiment_tables, write_experiment
+from hysteresis_ros.laboratory.linkage import GEOMETRY
+from hysteresis_ros.measurements import Measurement, write_csv
+from hysteresis_ros.model import MuscleModel
+from hysteresis_ros.model.loads import uncovered_load
+import numpy as np
+import pytest
+
+# Trials of the laboratory's bench under 1.2 and 7.1 N.
+FAR_APART = {'length_trials': [0, 3], 'force_trials': [0]}
+
+
+def tables(names=('length.csv', 'force.csv'), experiment='bench', seed=3):
+    found = experiment_tables(experiment, {}, seed)
+    return [Measurement.from_columns(found[name], source=name) for name in names]
+
+
+@pytest.fixture(scope='module')
+def two_loads():
+    """Return the model of a bench without any load between its least and its largest."""
+    length, force = tables()
+    return identify(length.select([0, 3]), force, geometry=BicepGeometry.from_mapping(GEOMETRY),
+                    **FAR_APART).model
+
+
+def test_the_error_of_loads_left_out_is_kept(two_loads, tmp_path):
+    length, force = tables()
+    found = identify(length, force, length_trials=range(4), force_trials=[0])
+    fit = found.length_fit
+    kept = found.model.metrics['length']['left_out']['rmse']
+    assert kept == fit.validation[fit.strengths == fit.strength][0] > fit.rmse
+    # Without trials that verify, it is what the bench's error is known from.
+    assert length_error(two_loads) == two_loads.metrics['length']['left_out']['rmse']
+    assert length_error(two_loads) > 2.0 * two_loads.metrics['length']['identification']['rmse']
+    two_loads.save(tmp_path / 'model.yaml')
+    again = MuscleModel.load(tmp_path / 'model.yaml')
+    assert again.metrics['length']['left_out'] == two_loads.metrics['length']['left_out']
+    one = identify(length, force, length_trials=[0], force_trials=[0]).model
+    assert 'left_out' not in one.metrics['length']
+
+
+def test_effects_change_the_error_of_loads_left_out(two_loads):
+    length, force = tables()
+    base = identify(length, force, length_trials=range(4), force_trials=[0]).model
+    extended, _ = add_effects(base, length, force, ['stress_dependent_strain'],
+                              length_trials=range(4), force_trials=[0])
+    before, after = (one.metrics['length']['left_out']['rmse'] for one in (base, extended))
+    assert after < 0.95 * before
+    assert extended.metrics['length']['verification']['rmse'] > 0.0
+
+
+def with_loads(model, *loads):
+    """Return a model that was identified under these loads [N]."""
+    provenance = {**model.provenance, 'length': {'loads': list(loads)}}
+    return dataclasses.replace(model, provenance=provenance)
+
+
+@pytest.mark.parametrize('loads, found', [
+    ((2.0, 4.0, 6.0, 8.0), None), ((2.0, 8.0), None), ((2.0, 3.0, 5.0), (2.0, 5.0, False)),
+    ((6.5, 7.0), (6.5, 7.0, False)), ((1.0, 2.0, 3.0, 9.0), (3.0, 9.0, True)),
+    ((1.0, 5.5, 6.0, 6.5, 7.0, 7.5), None), ((), None)])
+def test_loads_that_the_bench_has_not_seen(two_loads, loads, found):
+    theta = np.linspace(np.radians(90.0), np.radians(120.0), 20)
+    arm = two_loads.geometry.force(theta)
+    assert 5.7 < arm.min() < arm.max() < 7.0
+    result = uncovered_load(with_loads(two_loads, *loads), theta)
+    if found is None:
+        assert result is None
+    else:
+        assert result[0] == (arm.min(), arm.max())
+        assert (*result[1], result[2]) == found
+
+
+def test_commands_warn_of_loads_beyond_the_bench(two_loads, tmp_path, capsys):
+    write_experiment('bench', tmp_path, seed=3)
+    fit = ['identify', '--force', f'{tmp_path}/force.csv', '--length', f'{tmp_path}/length.csv',
+           '--force-trials', '0', '--geometry', f'{tmp_path}/geometry.yaml', '-o',
+           f'{tmp_path}/model.yaml', '--length-trials']
+    assert main([*fit, '0-3']) == 0
+    assert "the arm's load" not in capsys.readouterr().err
+    assert main([*fit, '0,1']) == 0
+    warning = "lies beyond the bench's 1.2 to 3.1 N: expect larger errors there"
+    assert warning in capsys.readouterr().err
+    voltage = np.repeat([0.0, 2.0, 3.0, 2.5, 4.0, 1.0], 5)
+    write_csv({'time': np.arange(30) * 30.0, 'trial': np.zeros(30), 'voltage': voltage,
+               'angle': 2.4 - 0.12 * voltage}, tmp_path / 'arm.csv')
+    for command in ('compare', 'diagnose'):
+        assert main([command, '--model', f'{tmp_path}/model.yaml', '--data',
+                     f'{tmp_path}/arm.csv']) == 0
+        assert warning in capsys.readouterr().err
+
+
+@pytest.mark.xfail(strict=True, reason='two loads say nothing of those between them')
+def test_a_clean_arm_is_not_faulty_by_a_bench_of_two_loads(two_loads):
+    recording, = tables(['train.csv'], 'arm-steps')
+    found = diagnose(two_loads, [recording.select([0, 1])], seed=1)
+    assert found.verdict in ('adequate', 'not_excited')
