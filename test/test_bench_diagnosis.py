@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
-from hysteresis_ros.diagnosis import search
+from hysteresis_ros.diagnosis import bench_selection
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -87,9 +87,9 @@ def ratcheting(drive):
 
 def found_in(measurement, monkeypatch, names=('thermal_lag', 'fatigue', 'latency')):
     """Diagnose a table with the model of its own Preisach operator."""
-    possible = search.possible
-    monkeypatch.setattr(search, 'possible', lambda problem, known: (
-        [name for name in possible(problem, known)[0] if name in names], {}))
+    observable = bench_selection.observable
+    monkeypatch.setattr(bench_selection, 'observable', lambda problem: (
+        [name for name in observable(problem)[0] if name in names], {}))
     model = identify(measurement, operator='preisach', levels=(12, 12)).model
     return diagnose(model, [measurement], seed=1)
 

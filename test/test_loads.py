@@ -102,8 +102,7 @@ def test_commands_warn_of_loads_beyond_the_bench(two_loads, tmp_path, capsys):
         assert warning in capsys.readouterr().err
 
 
-@pytest.mark.xfail(strict=True, reason='two loads do not tell how the muscle answers to those '
-                                      'between them, and no part of the discrepancy does')
+@pytest.mark.xfail(strict=True, reason='the discrepancy does not know what two loads do not show')
 def test_a_clean_arm_is_not_faulty_by_a_bench_of_two_loads(two_loads):
     recording, = tables(['train.csv'], 'arm-steps')
     found = diagnose(two_loads, [recording.select([0, 1])], seed=1)
