@@ -184,7 +184,7 @@ def test_what_cannot_be_told_apart_is_named_as_an_alternative(model):
 def test_of_starts_without_any_effect_a_fit_still_finds_the_stop(model):
     """A stop is looked for where the response ends, though stops out of reach change nothing."""
     clean = recording(model)
-    stop = float(np.quantile(clean.column('angle'), 0.8))
+    stop = float(np.quantile(clean.column('angle'), 0.5))
     measured = recording(model, [effect_of(model, 'end_stop', stop=stop, side=1.0, stiffness=8.0)])
     told = diagnose(model, [measured], ['end_stop', 'payload_error'])
     assert told.missing == ['end_stop']
