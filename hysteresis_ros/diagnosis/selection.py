@@ -78,18 +78,30 @@ class Selection:
 
     def run(self) -> None:
         """Score all single effects and pairs, fit the best, and grow sets from them."""
+        stages = (self._score, self._fit_alone, self._grow_sets)
+        for stage in self.progress(stages, len(stages)):
+            stage()
+
+    def _score(self) -> None:
         self.alone = self._beside(self.base)
+
+    def _fit_alone(self) -> None:
+        """Fit every effect by itself, from the start that scored best."""
         self._fit([effects for _, effects in self.alone.singles().values()])
         self.p_values = self._significance()
         self._grown.add(frozenset())
-        for size in range(1, self.settings.most_effects + 1):
-            self._refine(size)
-            if size == self.settings.most_effects or not self._worth_growing():
+        self._refine(1)
+
+    def _grow_sets(self) -> None:
+        """Grow sets, size by size, while the best one leaves too much."""
+        for size in range(1, self.settings.most_effects):
+            if not self._worth_growing():
                 break
             if size == 1:
                 self._fit_best(self.alone.pairs())
-            for names in self.progress(self._ranked_of(size), self.settings.beam):
+            for names in self._ranked_of(size):
                 self.grow(names)
+            self._refine(size + 1)
         self._refine_best()
 
     def _significance(self) -> dict[str, float]:
