@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The host's side of the board, on real ports, simulated ones, and ports that misbehave."""
 
+from dataclasses import replace
 import math
 import os
 import select
@@ -207,7 +208,8 @@ def test_stop_writes_zero_and_disable_before_closing():
 
 
 def test_setpoint_that_is_not_repeated_expires(boards):
-    board = online(boards('sim://bicep'))
+    # Long enough for a busy machine to see the voltage before it goes.
+    board = online(boards('sim://bicep', timeouts=replace(QUICK, setpoint=2.0)))
     board.enable(True)
     board.set_voltage(4.0)
     until(lambda: board.status.sample.voltage > 3.9, 'the voltage')

@@ -111,11 +111,11 @@ class Grains:
         heating, cooling : float
             Temperature felt by the turn to austenite and by the turn back [degC].
         """
-        return float(np.add.reduce(self._turn(heating, cooling))) / len(self._share)
+        return float(self._turn(heating, cooling).sum()) / len(self._share)
 
     def commit(self, heating: float, cooling: float) -> float:
         """Bring the grains to the felt temperatures [degC] and return the martensite share."""
-        share = float(np.add.reduce(self._turn(heating, cooling))) / len(self._share)
+        share = float(self._turn(heating, cooling).sum()) / len(self._share)
         self._share, self._next = self._next, self._share
         return share
 
