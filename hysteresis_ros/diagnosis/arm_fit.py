@@ -18,8 +18,9 @@ from hysteresis_ros.diagnosis.parameters import ParameterVector
 # Simulated responses are smooth only on this scale of the parameters' units.
 DIFFERENCE = 0.02
 MOST_STEPS = 12
-# Dampings that are tried at once, against the present one.
-DAMPINGS = (0.1, 1.0, 30.0)
+# What the damping is divided by after a step that was good, and multiplied by after one that was not.
+EASIER, HARDER = 10.0, 30.0
+FIRST_DAMPING, MOST_DAMPING = 1e-2, 1e3
 # A step that gains less than this in the log posterior ends the fit.
 LEAST_GAIN = 0.02
 # Longest step in the parameters' units, in which their range is about one.
@@ -84,7 +85,7 @@ class _Walk:
         inside = 1e-6 * (self.parameters.upper - self.parameters.lower)
         self.vector = np.clip(self.parameters.vector(), self.parameters.lower + inside,
                               self.parameters.upper - inside)
-        self.damping = 1e-2
+        self.damping = FIRST_DAMPING
         self.predicted = self.jacobian = None
         self.cost, self.active = np.inf, True
 
@@ -101,17 +102,16 @@ class _Walk:
             steps.append(step)
         return vectors, steps
 
-    def candidates(self, jacobian, residual):
-        """Return the vectors after steps of several dampings."""
-        matrix = jacobian.T @ jacobian + np.diag(self.spread ** -2.0)
-        slope = jacobian.T @ residual - (self.vector - self.mean) / self.spread ** 2
-        found = []
-        for damping in DAMPINGS:
-            damped = matrix + self.damping * damping * np.diag(np.diag(matrix))
-            step = np.clip(np.linalg.solve(damped, slope), -LONGEST, LONGEST)
-            found.append(np.clip(self.vector + step, self.parameters.lower,
-                                 self.parameters.upper))
-        return found
+    def candidate(self, jacobian, residual):
+        """Return the vector after one step, and the cost that it saves by the linearisation."""
+        precision = self.spread ** -2.0
+        matrix = jacobian.T @ jacobian + np.diag(precision)
+        slope = jacobian.T @ residual - (self.vector - self.mean) * precision
+        damped = matrix + self.damping * np.diag(np.diag(matrix))
+        step = np.clip(np.linalg.solve(damped, slope), -LONGEST, LONGEST)
+        vector = np.clip(self.vector + step, self.parameters.lower, self.parameters.upper)
+        step = vector - self.vector
+        return vector, float(2.0 * slope @ step - step @ matrix @ step)
 
 
 class Fitter:
@@ -172,20 +172,19 @@ class Fitter:
             active = [walk for walk in active if walk.active and len(walk.vector)]
             if left == 0:
                 break
-            trials = [walk.candidates(point.whiten(walk.jacobian), point.whiten(
+            steps_of = [walk.candidate(point.whiten(walk.jacobian), point.whiten(
                 self.problem.measured - walk.predicted)) for walk in active]
-            for walk, vectors, responses in zip(active, trials, self._at(active, trials)):
-                before = walk.cost
-                for damping, vector, predicted in zip(DAMPINGS, vectors, responses):
-                    if self._take(walk, vector, predicted, point):
-                        chosen = damping
-                if before - walk.cost > 0.0:
-                    walk.damping = max(walk.damping * chosen, 1e-6)
+            for walk, (_, saved) in zip(active, steps_of):
+                walk.active = saved > 2.0 * LEAST_GAIN
+            moves = [(walk, vector) for walk, (vector, _) in zip(active, steps_of) if walk.active]
+            for (walk, vector), (predicted,) in zip(moves, self._at(
+                    [walk for walk, _ in moves], [[vector] for _, vector in moves])):
+                if self._take(walk, vector, predicted, point):
+                    walk.damping = max(walk.damping / EASIER, 1e-6)
+                    walk.jacobian = None
                 else:
-                    walk.damping *= 30.0
-                walk.active = before - walk.cost > 2.0 * LEAST_GAIN or (
-                    walk.cost == before and walk.damping < 1.0)
-                walk.jacobian = walk.jacobian if walk.cost == before else None
+                    walk.damping *= HARDER
+                    walk.active = walk.damping < MOST_DAMPING
         self._differentiate([walk for walk in walks if walk.jacobian is None])
         return [self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
                                walk.predicted, walk.jacobian))
