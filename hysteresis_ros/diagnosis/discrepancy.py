@@ -4,8 +4,8 @@
 Discrepancy of the base model: how wrong it is by itself, as a covariance of an arm's angles.
 
 Two parts are known before the arm moves. The bench says how large the error of the length is, on
-trials or loads that were held out; on the arm it shows as an error of the angle that is smooth in
-drive and response and differs between the directions of the drive. And the bench holds the load
+trials or loads that were held out; on the arm it shows as an error of the angle that is alike at
+neighbouring drives and responses and differs between the directions of the drive. And the bench holds the load
 still, while an arm's load moves with the wire: what a load does in the middle of a transformation
 the bench cannot tell. Two models that agree on every bench table bound it: the load acts inside
 the operator and leaves its mark in the memory, or the muscle is at each moment as if its present
@@ -79,7 +79,7 @@ def covariance(problem, gain, predicted, path, settings) -> np.ndarray:
     ndarray, shape (n, n)
         In the squared unit of the response.
     """
-    near = _smooth(problem, predicted, settings.correlation)
+    near = _correlation(problem, predicted, settings.correlation)
     direction = np.ones(len(predicted))
     if 'direction' in problem.signals:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
@@ -89,13 +89,19 @@ def covariance(problem, gain, predicted, path, settings) -> np.ndarray:
     return near * (bench + np.outer(path, path))
 
 
-def _smooth(problem, predicted, length: float) -> np.ndarray:
-    """Return the correlation (n, n) of what is smooth in drive and response over a `length`."""
+def _correlation(problem, predicted, length: float) -> np.ndarray:
+    """
+    Return the correlation (n, n) of errors at neighbouring drives and responses.
+
+    1 / sqrt(1 + d^2 / length^2), the rational quadratic kernel with alpha = 1/2: a mixture of
+    errors of every length from that of the bench's grid on (Rasmussen and Williams, Gaussian
+    Processes for Machine Learning, eq. 4.19).
+    """
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
     places = np.column_stack([_unit(drive), _unit(predicted)]) / length
     squares = np.sum(places ** 2, axis=1)
     gaps = squares[:, None] + squares[None, :] - 2.0 * places @ places.T
-    return np.exp(-0.5 * np.maximum(gaps, 0.0))
+    return 1.0 / np.sqrt(1.0 + np.maximum(gaps, 0.0))
 
 
 def path_difference(problem, effects) -> np.ndarray:

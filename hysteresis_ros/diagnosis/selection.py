@@ -21,7 +21,7 @@ from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 
 # Drift and noise of the first covariances, as shares of the discrepancy.
-FIRST_POINTS = ((0.1, 0.3), (0.4, 0.6), (1.5, 0.3), (6.0, 0.3))
+FIRST_POINTS = ((0.1, 0.05), (0.4, 0.3), (1.5, 0.3), (6.0, 0.3))
 # Sets that are begun, for one that is fitted to the end, and steps of what is begun.
 BEGUN, FIRST_STEPS = 3, 3
 # Of several effects each has to take this share off the first error, to be seen beside it.

@@ -28,8 +28,8 @@ class Settings:
         Spread (natural logarithm) of the discrepancy's size against that seen on the bench,
         because the arm goes other ways than the bench: a third.
     correlation : float
-        Length over which the discrepancy changes, as a share of the range of drive and response:
-        weights of the bench's grid are smooth over about half of it.
+        Shortest length over which the discrepancy changes, as a share of the range of drive and
+        response: about two cells of the bench's grid of weights.
     practical : float
         Smallest reduction of the RMSE that matters to a user.
     form : float
@@ -53,7 +53,7 @@ class Settings:
     beam: int = 3
     refits: int = 6
     scale_spread: float = 0.3
-    correlation: float = 0.45
+    correlation: float = 0.05
     practical: float = 0.05
     form: float = 0.1
     residual_share: float = 0.08
