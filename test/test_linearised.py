@@ -46,7 +46,7 @@ def test_the_evidence_is_that_of_the_marginal_gaussian(chosen):
     residual = 0.01 * rng.standard_normal(80)
     for start in starts:
         start.change += 0.003 * rng.standard_normal(80)
-    found = Linearised(covariance, residual, starts).evidences(chosen)[0]
+    found = Linearised(covariance.points, residual, starts).evidences(chosen)[0]
     own = [starts[index] for index in chosen[0]]
     columns = np.column_stack([start.columns for start in own])
     matrix = point.factor @ point.factor.T + columns @ columns.T
@@ -63,7 +63,7 @@ def test_an_effect_that_is_there_has_the_best_evidence():
     rng = np.random.default_rng(2)
     residual = (starts[2].columns[:, 0] - 0.7 * starts[7].columns[:, 0]
                 + 0.002 * rng.standard_normal(150))
-    family = Linearised(covariance, residual, starts)
+    family = Linearised(covariance.points, residual, starts)
     pairs = family.pairs()
     assert max(pairs, key=lambda names: pairs[names][0]) == tuple(sorted((NAMES[2], NAMES[7])))
     singles = family.singles()
@@ -82,7 +82,7 @@ def test_autocorrelated_noise_is_seldom_taken_for_an_effect(trials, rows, rho):
         for drift, noise in ((0.1, 0.3), (1.5, 0.3), (6.0, 0.3)):
             covariance.add(covariance.start(drift, noise))
         point = covariance.add(covariance.fit(residual))
-        values = Linearised(covariance, residual, starts).p_values(point, rng, 100)
+        values = Linearised(covariance.points, residual, starts).p_values(point, rng, 100)
         rejected += min(values.values()) <= 0.05
     assert rejected <= 8, rejected
 
@@ -92,6 +92,6 @@ def test_a_p_value_is_never_zero():
     covariance, starts = make(2, 60)
     point = covariance.add(covariance.start(0.4, 1.0))
     residual = 5.0 * starts[3].columns[:, 0]
-    values = Linearised(covariance, residual, starts).p_values(
+    values = Linearised(covariance.points, residual, starts).p_values(
         point, np.random.default_rng(0), 50)
     assert min(values.values()) == pytest.approx(1.0 / 51.0)

@@ -11,7 +11,7 @@ import dataclasses
 
 import numpy as np
 
-from hysteresis_ros.diagnosis.covariance import Point
+from hysteresis_ros.diagnosis.covariance import Covariance, Point
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector
 
@@ -54,6 +54,11 @@ class Fit:
         Posterior covariance of `vector`.
     held_out : ndarray, shape (n,), or None
         Response of every row as predicted by a fit to the other folds.
+    covariance : Covariance or None
+        That of the base model's error along the way that the arm takes with these effects; None
+        for the way that it takes without.
+    judged : int
+        How many covariances at hand were tried with `covariance`.
     """
 
     effects: list
@@ -64,6 +69,8 @@ class Fit:
     point: Point | None = None
     spread: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     held_out: np.ndarray | None = None
+    covariance: Covariance | None = None
+    judged: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -124,11 +131,14 @@ class Fitter:
         Runs of an arm.
     covariance : Covariance
         Of the residuals.
+    discrepancy : callable
+        ``discrepancy(fit)``: that of the base model along the way of a fit, shape (n, n).
     """
 
-    def __init__(self, problem, covariance):
+    def __init__(self, problem, covariance, discrepancy):
         self.problem = problem
         self.covariance = covariance
+        self.discrepancy = discrepancy
         self.fixed = list(problem.model.effects)
         self.simulations = 0
 
@@ -227,8 +237,14 @@ class Fitter:
         mean, spread = ParameterVector(fit.effects, self.problem.kind).prior()
         away = (fit.vector - mean) / spread
         prior = -0.5 * float(away @ away) - float(np.sum(np.log(spread)))
-        best = dataclasses.replace(fit, log_evidence=-np.inf)
-        for point in self.covariance.points:
+        if fit.covariance is None:
+            best, points = dataclasses.replace(fit, log_evidence=-np.inf), self.covariance.points
+        else:
+            count = len(self.covariance.points)
+            best = dataclasses.replace(fit, judged=count)
+            points = (fit.covariance.point(point.values)
+                      for point in self.covariance.points[fit.judged:])
+        for point in points:
             residual = point.whiten(self.problem.measured - fit.predicted)
             jacobian = point.whiten(fit.jacobian) if len(fit.vector) else fit.jacobian
             matrix = jacobian.T @ jacobian + np.diag(spread ** -2.0)
@@ -236,15 +252,24 @@ class Fitter:
                         - 0.5 * float(np.linalg.slogdet(matrix)[1]))
             if evidence > best.log_evidence:
                 best = dataclasses.replace(
-                    fit, log_evidence=evidence, point=point, spread=np.linalg.inv(matrix))
+                    best, log_evidence=evidence, point=point, spread=np.linalg.inv(matrix))
         return best
+
+    def along(self, fit: Fit) -> Fit:
+        """Return a fit judged by the discrepancy along the way that the arm takes with it."""
+        own = self.covariance.of(self.discrepancy(fit))
+        return self.judge(dataclasses.replace(
+            fit, covariance=own, judged=0, log_evidence=-np.inf))
 
     def refined(self, fit: Fit) -> Fit:
         """Fit the covariance to what a fit leaves, then the effects under it once more."""
-        values = self.covariance.fit(self.problem.measured - fit.predicted, fit.point.values)
-        point = self.covariance.add(values)
-        better = self.fit([fit.effects], point, steps=3) if len(fit.vector) else [fit]
-        return max([self.judge(one) for one in (fit, *better)], key=lambda one: one.log_evidence)
+        own = fit.covariance or self.covariance
+        values = own.fit(self.problem.measured - fit.predicted, fit.point.values)
+        self.covariance.add(values)
+        point = own.point(values)
+        better = self.fit([fit.effects], point, steps=3) if len(fit.vector) else []
+        better = [one if fit.covariance is None else self.along(one) for one in better]
+        return max([self.judge(fit), *better], key=lambda one: one.log_evidence)
 
     def least_squares(self, fit: Fit) -> Fit:
         """

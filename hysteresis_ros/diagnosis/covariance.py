@@ -12,6 +12,7 @@ that neither noise nor autocorrelation is taken for an effect. Their priors are 
 one, because the bench says how large the discrepancy is, a is of its size or less (half-Cauchy).
 """
 
+import copy
 import dataclasses
 
 import numpy as np
@@ -100,6 +101,12 @@ class Covariance:
                                np.log(WIDEST * self._scale)])
         self._high = np.maximum(self._high, self._low)
         self.points: list[Point] = []
+
+    def of(self, discrepancy) -> 'Covariance':
+        """Return covariances with another discrepancy (n, n), and none at hand."""
+        other = copy.copy(self)
+        other._discrepancy, other.points = discrepancy, []
+        return other
 
     def start(self, drift: float = 0.1, noise: float = 0.0) -> np.ndarray:
         """Return values (4,) with a drift and a noise given as shares of the discrepancy."""

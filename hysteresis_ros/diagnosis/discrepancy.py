@@ -58,7 +58,7 @@ def sensitivity(problem, effects) -> np.ndarray:
     return (up - down) / (2.0 * step)
 
 
-def covariance(problem, gain, predicted, path, settings) -> np.ndarray:
+def covariance(problem, effects, predicted, settings) -> np.ndarray:
     """
     Return the covariance of the base model's own error of the angle.
 
@@ -66,12 +66,10 @@ def covariance(problem, gain, predicted, path, settings) -> np.ndarray:
     ----------
     problem : Problem
         Rows and model.
-    gain : ndarray, shape (n,)
-        See `sensitivity`.
+    effects : sequence of Effect
+        All effects of the model, which say where the arm goes.
     predicted : ndarray, shape (n,)
-        Response of the base model.
-    path : ndarray, shape (n,)
-        See `path_difference`.
+        Response with them.
     settings : Settings
 
     Returns
@@ -79,6 +77,7 @@ def covariance(problem, gain, predicted, path, settings) -> np.ndarray:
     ndarray, shape (n, n)
         In the squared unit of the response.
     """
+    gain, path = sensitivity(problem, effects), path_difference(problem, effects)
     near = _correlation(problem, predicted, settings.correlation)
     direction = np.ones(len(predicted))
     if 'direction' in problem.signals:
@@ -116,6 +115,8 @@ def path_difference(problem, effects) -> np.ndarray:
         Effects of the model.
     """
     model = problem.model
+    # Those that depend on the phase would need it; what the load does differs little by them.
+    effects = [effect for effect in effects if not effect.needs_phase]
     chain = Chain([effect for effect in effects if effect.stage != 'sensor'], model.surroundings)
     first, stage = model.first_stage(chain), model.require_length_stage()
     if not first.loaded:

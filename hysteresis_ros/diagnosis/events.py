@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from hysteresis_ros.diagnosis.discrepancy import sensitivity
+
 # On each side of the moment at least this share of the rows is needed.
 MARGIN = 0.06
 
@@ -37,8 +39,8 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
     residual = problem.measured - selection.base.predicted
     rows = np.arange(margin, count - margin)
     steps = (np.arange(count)[:, None] >= rows[None, :]).astype(float)
-    shapes = [np.ones(count), selection.gain / max(float(np.sqrt(np.mean(
-        selection.gain ** 2))), 1e-300)]
+    gain = sensitivity(problem, selection.fixed)
+    shapes = [np.ones(count), gain / max(float(np.sqrt(np.mean(gain ** 2))), 1e-300)]
     prior = max(float(np.mean(residual ** 2)), 1e-300)
     best, moment = -np.inf, rows[0]
     for point in selection.covariance.points:

@@ -109,8 +109,8 @@ class Linearised:
 
     Parameters
     ----------
-    covariance : Covariance
-        Its `points` are tried.
+    points : list of Point
+        Covariances to try.
     residual : ndarray, shape (n,)
         What the fit leaves.
     starts : list of Start
@@ -119,7 +119,7 @@ class Linearised:
         estimated anew with whatever is added.
     """
 
-    def __init__(self, covariance, residual, starts, nuisance=None):
+    def __init__(self, points, residual, starts, nuisance=None):
         self.starts = starts
         count = len(residual)
         nuisance = np.zeros((count, 0)) if nuisance is None else nuisance
@@ -129,7 +129,7 @@ class Linearised:
                   for start in starts]
         self._columns = np.column_stack([
             residual, *(start.change for start in starts), nuisance, *blocks])
-        self._points = covariance.points
+        self._points = points
         self._grams = []
         for point in self._points:
             whitened = point.whiten(self._columns)

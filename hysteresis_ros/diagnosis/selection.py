@@ -15,9 +15,9 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance
-from hysteresis_ros.diagnosis.discrepancy import covariance, path_difference, sensitivity
+from hysteresis_ros.diagnosis.discrepancy import covariance
 from hysteresis_ros.diagnosis.linearised import Linearised, Start, starts_beside
-from hysteresis_ros.diagnosis.observable import observable
+from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 
 # Drift and noise of the first covariances, as shares of the discrepancy.
@@ -56,13 +56,11 @@ class Selection:
         self.rng, self.progress = rng, progress
         self.names, self.unobservable = observable(problem)
         self.fixed = list(problem.model.effects)
-        self.gain = sensitivity(problem, self.fixed)
         predicted = problem.simulate(self.fixed)
         self.covariance = Covariance(
-            covariance(problem, self.gain, predicted, path_difference(problem, self.fixed),
-                       settings),
-            problem.clock, problem.trial, problem.noise, settings.scale_spread)
-        self.fitter = Fitter(problem, self.covariance)
+            covariance(problem, self.fixed, predicted, settings), problem.clock, problem.trial,
+            problem.noise, settings.scale_spread)
+        self.fitter = Fitter(problem, self.covariance, self._discrepancy)
         for drift, noise in FIRST_POINTS:
             self.covariance.add(self.covariance.start(drift, noise))
         self.covariance.add(self.covariance.fit(problem.measured - predicted))
@@ -75,6 +73,11 @@ class Selection:
         self.limit = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised | None = None
         self.p_values: dict[str, float] = {}
+
+    def _discrepancy(self, fit) -> np.ndarray:
+        """Return the discrepancy (n, n) of the base model where the arm goes with a fit."""
+        effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
+        return covariance(self.problem, effects, fit.predicted, self.settings)
 
     def run(self) -> None:
         """Score all single effects and pairs, fit the best, and grow sets from them."""
@@ -112,7 +115,7 @@ class Selection:
                 mean, spread = ParameterVector(fit.effects, self.problem.kind).prior()
                 change = fit.predicted - self.base.predicted + fit.jacobian @ (mean - fit.vector)
                 fitted.append(Start(fit.effects[0], change, fit.jacobian * spread))
-        family = Linearised(self.covariance, self.problem.measured - self.base.predicted,
+        family = Linearised(self.covariance.points, self.problem.measured - self.base.predicted,
                             [*self.alone.starts, *fitted])
         return family.p_values(self.base.point, self.rng, self.settings.draws)
 
@@ -158,8 +161,10 @@ class Selection:
         taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
         names = [name for name in self.names if name not in taken]
         _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
-        return Linearised(self.covariance, self.problem.measured - fit.predicted,
-                          starts_beside(self.fitter, fit, names), fit.jacobian * spread)
+        return Linearised(
+            [fit.point] if fit.covariance else self.covariance.points,
+            self.problem.measured - fit.predicted,
+            starts_beside(self.fitter, fit, names), fit.jacobian * spread)
 
     def _fit_best(self, scored) -> None:
         """Fit the best sets for a few steps, and the best of these to the end."""
@@ -173,7 +178,7 @@ class Selection:
     def _fit(self, sets) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
         for fit in self.fitter.fit(sets, self._metric()):
-            self._keep(fit)
+            self._keep(self.fitter.along(fit))
 
     def _metric(self):
         """Return the covariance in whose units fits are made: the expected discrepancy's."""
@@ -185,13 +190,16 @@ class Selection:
             self.fits[names] = fit
 
     def _refine(self, size) -> None:
-        """Estimate the covariance for the most probable sets of a size, then judge all anew."""
-        for names in self._ranked_of(size):
-            if names not in self._refined:
-                self._refined.add(names)
-                self.fits[names] = self.fitter.refined(self.fits[names])
-                least = self.fitter.least_squares(self.fits[names])
-                self._least_errors[names] = self.fitter.error(least.predicted)
+        """Give the most probable sets of a size covariances of their own, then judge all anew."""
+        for _ in range(self.settings.refits):
+            found = [names for names in self._ranked_of(size) if names not in self._refined]
+            if not found:
+                break
+            names = found[0]
+            self._refined.add(names)
+            self.fits[names] = self.fitter.refined(self.fits[names])
+            least = self.fitter.least_squares(self.fits[names])
+            self._least_errors[names] = self.fitter.error(least.predicted)
         self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
         self.base = self.fits[frozenset()]
 
