@@ -129,7 +129,7 @@ def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
     gain = discrepancy.sensitivity(problem, [])
     predicted = problem.simulate([])
     path = discrepancy.path_difference(problem, [])
-    found = discrepancy.covariance(problem, gain, predicted, path, Settings())
+    found = discrepancy.covariance(problem, [], predicted, Settings())
     assert np.diag(found) == pytest.approx((0.0004 * gain) ** 2 + path ** 2)
     assert found == pytest.approx(found.T)
     assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
@@ -137,8 +137,8 @@ def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
 
 def test_errors_of_rows_that_are_near_in_drive_and_response_are_alike(problem):
     """More so on the same way of the drive than on the way back."""
-    gain, predicted = discrepancy.sensitivity(problem, []), problem.simulate([])
-    found = discrepancy.covariance(problem, gain, predicted, 0.0 * gain, Settings())
+    predicted = problem.simulate([])
+    found = discrepancy.covariance(problem, [], predicted, Settings())
     size = np.sqrt(np.diag(found))
     correlation = found / np.outer(size, size)
     drive, direction = problem.signals['drive'], problem.signals['direction'] > 0.0
@@ -146,7 +146,7 @@ def test_errors_of_rows_that_are_near_in_drive_and_response_are_alike(problem):
                     (predicted[:, None] - predicted) / np.ptp(predicted))
     same = direction[:, None] == direction[None, :]
     close = near < 0.05
-    assert correlation[close & same].min() > 0.9
+    assert correlation[close & same].min() > 0.7
     assert 0.4 < correlation[close & ~same].mean() < 0.8
     assert correlation[near > 1.2].max() < 0.1
 

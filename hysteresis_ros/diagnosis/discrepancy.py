@@ -115,9 +115,11 @@ def path_difference(problem, effects) -> np.ndarray:
         Effects of the model.
     """
     model = problem.model
-    # Those that depend on the phase would need it; what the load does differs little by them.
-    effects = [effect for effect in effects if not effect.needs_phase]
-    chain = Chain([effect for effect in effects if effect.stage != 'sensor'], model.surroundings)
+    # What the sensor adds is no way of the arm; what depends on the phase would need it, and
+    # changes little of what the load does.
+    effects = [effect for effect in effects
+               if effect.stage != 'sensor' and not effect.needs_phase]
+    chain = Chain(effects, model.surroundings)
     first, stage = model.first_stage(chain), model.require_length_stage()
     if not first.loaded:
         return np.zeros(len(problem.measured))
