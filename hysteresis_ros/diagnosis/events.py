@@ -43,17 +43,26 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
     shapes = [np.ones(count), gain / max(float(np.sqrt(np.mean(gain ** 2))), 1e-300)]
     prior = max(float(np.mean(residual ** 2)), 1e-300)
     best, moment = -np.inf, rows[0]
+    # As any effect, it has to explain more than the base model's own error.
+    large = [_explained(residual, steps * shape[:, None]) > selection.covariance.size ** 2
+             for shape in shapes]
     for point in selection.covariance.points:
         whitened = point.whiten(residual)
         base = point.constant - 0.5 * float(whitened @ whitened)
-        for shape in shapes:
+        for shape, enough in zip(shapes, large):
             columns = point.whiten(steps * shape[:, None])
             precision = np.sum(columns ** 2, axis=0) + 1.0 / prior
             slope = columns.T @ whitened
             evidence = base + 0.5 * slope ** 2 / precision - 0.5 * np.log(precision * prior)
+            evidence[~enough] = -np.inf
             index = int(np.argmax(evidence))
             if evidence[index] > best:
                 best, moment = float(evidence[index]), rows[index]
     odds = math.log(selection.settings.prior / (1.0 - selection.settings.prior))
     total = best + odds - math.log(len(rows) * len(shapes))
     return float(problem.clock[moment]), total / selection.settings.temper
+
+
+def _explained(residual, columns) -> np.ndarray:
+    """Return by how much each column (n, m) lowers the mean square of a residual, shape (m,)."""
+    return (columns.T @ residual) ** 2 / np.sum(columns ** 2, axis=0) / len(residual)
