@@ -77,7 +77,8 @@ class State(NamedTuple):
 
 
 @lean
-def place(arm, motion, line, demand, offset):
+def place(arm: Arm, motion: np.ndarray, line: int, demand: float, offset: float
+          ) -> tuple[int, float]:
     """Return the place at which the transformation gives `demand`, with an offset [m]."""
     last = len(arm.grid) - 1
     column, strain = DEMAND + LINE * line, STRAIN + LINE * line
@@ -105,7 +106,7 @@ def place(arm, motion, line, demand, offset):
 
 
 @lean
-def demand_at(arm, line, k, share, offset):
+def demand_at(arm: Arm, line: int, k: int, share: float, offset: float) -> float:
     """Return what the transformation has to give at a place: `place` inverted."""
     demand = grid.between(arm.grid, DEMAND + LINE * line, k, share)
     if arm.strained:
@@ -114,7 +115,7 @@ def demand_at(arm, line, k, share, offset):
 
 
 @lean
-def present(arm, motion):
+def present(arm: Arm, motion: np.ndarray) -> tuple[int, float]:
     """Return the place of the present angle."""
     angle = motion[ANGLE]
     step = arm.grid[1, THETA] - arm.grid[0, THETA]
@@ -123,7 +124,7 @@ def present(arm, motion):
 
 
 @lean
-def moved(motion, theta, dt):
+def moved(motion: np.ndarray, theta: float, dt: float) -> tuple[float, float]:
     """Return velocity and acceleration where the arm gets to `theta` within `dt`."""
     angle, velocity = motion[ANGLE], motion[VELOCITY]
     if motion[RINGING] != 0.0:
@@ -139,7 +140,7 @@ def moved(motion, theta, dt):
 
 
 @lean
-def keep_motion(arm, motion, angle, dt):
+def keep_motion(arm: Arm, motion: np.ndarray, angle: float, dt: float) -> None:
     """Note the velocity with which the arm gets to `angle`; none at an end or at rest."""
     if dt == 0.0 or angle == arm.grid[0, THETA] or angle == arm.grid[-1, THETA]:
         motion[VELOCITY] = motion[ACCELERATION] = 0.0
@@ -152,7 +153,7 @@ def keep_motion(arm, motion, angle, dt):
 
 
 @lean
-def required(arm, motion, line, k, share, dt):
+def required(arm: Arm, motion: np.ndarray, line: int, k: int, share: float, dt: float) -> float:
     """Return the load that the arm asks for at a place, reached within `dt`."""
     load = grid.between(arm.grid, LOAD + LINE * line, k, share)
     if dt != 0.0:
