@@ -262,5 +262,5 @@ class BoucWen(HysteresisOperator):
         """Build the operator from what `to_dict` returned; ParameterError if it cannot be."""
         names = ('stiffness', 'gain', 'rate', 'shape', 'exponent', 'bias', 'lower', 'upper')
         # Files written before there were dead zones do not name them.
-        return cls(*(take(parameters, name, 'Bouc-Wen operator') for name in names),
-                   parameters.get('thresholds', ()), parameters.get('bends', ()))
+        curve = {name: parameters.get(name, ()) for name in ('thresholds', 'bends')}
+        return cls(*(take(parameters, name, 'Bouc-Wen operator') for name in names), **curve)
