@@ -64,7 +64,7 @@ def test_cosines_and_what_is_left_beside_columns():
 def test_effects_that_the_bench_has_shown_may_differ_on_the_arm():
     """Those of the wire are tried again, those of the arm are not."""
     model = bicep_model(['series_compliance', 'payload_error'])
-    names, unobservable = observable(problem_for(model, [runs(model, step=0.1)]))
+    names, unobservable = observable(problem_for(model, [runs(model, dt=0.1)]))
     assert 'series_compliance' in names and 'encoder_offset' in names
     assert 'payload_error' not in {*names, *unobservable}
 
@@ -77,7 +77,7 @@ def test_what_needs_transients_is_unobservable_in_settled_rows(problem):
     assert not set(names) & set(unobservable)
     few = problem_for(problem.model, problem.measurements, ['thermal_lag', 'payload_error'])
     assert observable(few) == (['payload_error'], {'thermal_lag': 'every row is settled'})
-    moving = problem_for(problem.model, [runs(problem.model, step=0.1)])
+    moving = problem_for(problem.model, [runs(problem.model, dt=0.1)])
     assert 'thermal_lag' in observable(moving)[0]
 
 

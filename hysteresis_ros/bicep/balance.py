@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 GRID = math.radians(0.1)
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
-# Longest step of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
+# Longest dt of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
 # would not be stable.
 LONGEST_PHASE = 0.7
 # A step of x of less than this share of H2's range does not make an arm ring.

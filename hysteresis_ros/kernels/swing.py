@@ -1,7 +1,7 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One step of an arm in motion.
+An arm in motion, over one dt.
 
 The muscle pulls with what the arm asks for at rest, less what friction and inertia take:
 ``n F r(theta) = tau(theta) - tau_c - b dtheta/dt - I d2theta/dt2``. It gives way as always, so an
@@ -19,7 +19,7 @@ from .bundle import TYPICAL_COMPLIANCE
 from .lean import lean
 from .operator import last_input, peek, step
 
-# Least share of a load that is missing by which the load changes in a step.
+# Least share of a load that is missing by which the load changes in a dt.
 LEAST_GAIN = 1e-3
 # Load that may be missing, over that at rest.
 LOOSER = 1e4
@@ -31,7 +31,7 @@ EXACT = 1e-9
 def swing(arm: Arm, state: State, x: float, offset: float, factor: float, friction: float,
           dt: float) -> tuple[int, float]:
     """
-    Commit what the muscle does in a step and return the place at which the step ends.
+    Commit what the muscle does within dt and return the place at which the arm ends.
 
     Parameters
     ----------
@@ -43,10 +43,10 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
     friction : float
         Moment of dry friction against the motion [N m].
     dt : float
-        Duration of the step [s].
+        Time [s].
     """
     table, memory, motion = arm.wires.table, state.memories[0], state.motion
-    # Friction and inertia are linear in the angle that the step ends at.
+    # Friction and inertia are linear in the angle at the end of dt.
     speed, acceleration = moved(motion, 0.0, dt)
     faster, more = moved(motion, 1.0, dt)
     drag = friction + arm.viscous * speed + arm.inertia * acceleration
@@ -120,7 +120,7 @@ def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: f
 
 @lean
 def _pull(arm: Arm, k: int, share: float, drag: float, slope: float) -> float:
-    """Return the moment that the muscles have to hold at a place where the step may end."""
+    """Return the moment that the muscles have to hold at a place where the arm may end."""
     return (grid.between(arm.grid, MOMENT, k, share) - drag
             - slope * grid.between(arm.grid, THETA, k, share))
 

@@ -5,7 +5,7 @@ The arm from sample to sample, and over a whole trial.
 
 Dry friction lets the load lie in a band, inside which the arm sticks; viscous friction and inertia
 add what the present velocity and acceleration cost: by backward differences, of second order over
-equal steps, and while the arm rings by the method of Fox and Goodwin, Newmark's with beta = 1/12,
+an equal dt, and while the arm rings by the method of Fox and Goodwin, Newmark's with beta = 1/12,
 whose phase is of fourth order.
 """
 
@@ -23,12 +23,12 @@ from .operator import last_input, last_output, reset
 from .rest import direction, settle, settle_bundle
 from .swing import acceleration_at, swing
 
-# A step longer than this [s] is a settled state to which dynamics contribute nothing.
+# A dt longer than this [s] is a settled state to which dynamics contribute nothing.
 LONGEST_TRANSIENT = 5.0
-# What rings so fast that a sample would take more steps than this has come to rest by its end.
+# What rings so fast that a sample would take more pieces than this has come to rest by its end.
 MOST_PIECES = 200
 # An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
-# that is small, does not ring, and is followed in longer steps; the share fades from step to step.
+# that is small, does not ring, and is followed at a longer dt; the share fades from piece to piece.
 CALM, FADING = 0.005, 0.97
 
 
@@ -90,7 +90,7 @@ def step(arm: Arm, state: State, x: float, dt: float, offset: float, factor: flo
 
 @lean
 def _kick(arm: Arm, state: State, x: float, offset: float, factor: float) -> None:
-    """Begin a step with the acceleration under a new x."""
+    """Begin a dt with the acceleration under a new x."""
     motion = state.motion
     velocity = motion[VELOCITY]
     # An arm that friction holds is not accelerated before it slides.

@@ -30,7 +30,7 @@ DT = 0.1    # s
 
 def warm_up(model: MuscleModel | None = None) -> float:
     """
-    Run controller and observer of a model through a few steps, and return how long it took.
+    Run controller and observer of a model through a few samples, and return how long it took.
 
     Parameters
     ----------
@@ -57,10 +57,10 @@ def warm_up_controller(model: MuscleModel) -> float:
         arm = model.geometry is not None
         for horizon in (math.inf, 1.0):
             controller = model.controller(arm=arm, horizon=horizon)
-            for step, share in enumerate(SHARES):
+            for sample, share in enumerate(SHARES):
                 length, force = _reference(model, controller, share)
-                controller.setpoint(length, force, step * DT, ambient=math.nan)
-                controller.hold(step * DT + 0.5 * DT)
+                controller.setpoint(length, force, sample * DT, ambient=math.nan)
+                controller.hold(sample * DT + 0.5 * DT)
             controller.reset()
     return time.perf_counter() - start
 
@@ -70,8 +70,8 @@ def warm_up_observer(model: MuscleModel) -> float:
     start = time.perf_counter()
     with contextlib.suppress(HysteresisError):
         observer = model.observer()
-        for step, share in enumerate(SHARES):
-            observer.step(step * DT, _within(model.ranges[model.drive], share), math.nan)
+        for sample, share in enumerate(SHARES):
+            observer.step(sample * DT, _within(model.ranges[model.drive], share), math.nan)
         observer.reset()
     return time.perf_counter() - start
 
