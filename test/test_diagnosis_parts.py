@@ -11,7 +11,6 @@ import pytest
 from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.observable import observable
-from hysteresis_ros.diagnosis.problem import sensor_resolution
 from hysteresis_ros.diagnosis.residual import predictable, shares, unexplained_signal
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.significance import (
@@ -259,7 +258,7 @@ def test_the_noise_of_a_sensor_comes_from_its_steps():
     data = Measurement.from_columns({
         'time': 30.0 * np.arange(500.0), 'trial': np.zeros(500), 'voltage': angle,
         'angle': angle})
-    assert sensor_resolution(data) == pytest.approx(0.001 / 12 ** 0.5, rel=1e-6)
+    assert problem_for(bicep_model(), [data]).noise == pytest.approx(0.001 / 12 ** 0.5, rel=1e-6)
 
 
 def test_recordings_that_do_not_go_together_are_refused():
