@@ -3,8 +3,8 @@
 """
 The hidden state of the normalised Bouc-Wen operator, solved exactly between reversals.
 
-While the input u rises the state w follows dw/du = rho pace(w), pace = 1 - w^n for w >= 0 and
-1 + c |w|^n for w < 0 with c = 2 sigma - 1. So rho (u - u0) = G(w) - G(w0) with
+While the input u rises the state w follows dw/du = rho pace(w), with c = 2 sigma - 1 and pace
+``1 - w^n`` for w >= 0, ``1 + c |w|^n`` for w < 0. So ``rho (u - u0) = G(w) - G(w0)`` with ::
 
     G(w) = w F(1, b; 1 + b; w^n)  or, for w < 0,  w F(1, b; 1 + b; -c |w|^n),   b = 1 / n
 

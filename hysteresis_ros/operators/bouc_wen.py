@@ -4,7 +4,7 @@
 The normalised Bouc-Wen operator, solved exactly between reversals.
 
 In the normalised form (F. Ikhouane and J. Rodellar, Systems with Hysteresis, Wiley 2007, Sec. 2.4)
-the hidden state w in [-1, 1] follows the input u by
+the hidden state w in [-1, 1] follows the input u by ::
 
     dw = rho (du - sigma |du| |w|^(n-1) w + (sigma - 1) du |w|^n)
 
