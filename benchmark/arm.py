@@ -117,8 +117,9 @@ def reference(model, run, step: float) -> tuple[float, np.ndarray]:
     chain = model.chain()
     first, arm = model.first_stage(chain), arm_of(model)
     arm.start()
-    arm.settle(first.step(float(chain.to_heat(model.cold_drive))))
-    inputs = [first.step(float(chain.to_heat(drive))) for drive in run.columns['voltage'].tolist()]
+    arm.settle(first.step(float(chain.to_drive_squared(model.cold_drive))))
+    inputs = [first.step(float(chain.to_drive_squared(drive)))
+              for drive in run.columns['voltage'].tolist()]
     start = time.perf_counter()
     angles = [arm.step(x, step) for x in inputs]
     return time.perf_counter() - start, np.array(angles)

@@ -219,8 +219,8 @@ def baselines(force: Measurement, length: Measurement) -> dict:
     Returns
     -------
     dict
-        For the additive model and the embedded line mean |e| / P in percent, identification and
-        verification; for Fig. 9 mean |e| in mm at its load, one operator and two stages.
+        For the additive model and the embedded line mean ``|e| / P`` in percent, identification and
+        verification; for Fig. 9 mean ``|e|`` in mm at its load, one operator and two stages.
     """
     fitted = length.select(LENGTH_TRIALS)
     others = length.select(sorted(set(length.trials) - set(LENGTH_TRIALS)))

@@ -76,10 +76,10 @@ def effect_of(model, name, **values):
     return catalogue()[name](model.surroundings, **(values or STRENGTHS[name]))
 
 
-def arm_run(voltage, step=30.0, first=None, **columns):
-    """Return an arm run of one trial with rows `step` seconds apart."""
+def arm_run(voltage, dt=30.0, first=None, **columns):
+    """Return an arm run of one trial with rows `dt` seconds apart."""
     voltage = np.asarray(voltage, dtype=float)
-    time = step * np.arange(len(voltage)) + (step if first is None else first)
+    time = dt * np.arange(len(voltage)) + (dt if first is None else first)
     return Measurement.from_columns({
         'time': time, 'trial': np.zeros(len(voltage)), 'voltage': voltage,
         'angle': np.full(len(voltage), 1.5), **columns})
@@ -94,14 +94,14 @@ def wandering_voltage(rows, seed=0):
     return 6.0 * (waves - waves.min()) / np.ptp(waves)
 
 
-def runs(model, trials=3, rows=ROWS, seed=0, step=30.0, sizes=None):
+def runs(model, trials=3, rows=ROWS, seed=0, dt=30.0, sizes=None):
     """Return an arm run of some settled trials that the model itself has made."""
     sizes = sizes or [rows] * trials
     voltage = np.concatenate([
         wandering_voltage(400, seed + trial)[::400 // size][:size]
         for trial, size in enumerate(sizes)])
     trial = np.repeat(np.arange(float(len(sizes))), sizes)
-    time = step * np.concatenate([1.0 + np.arange(size) for size in sizes])
+    time = dt * np.concatenate([1.0 + np.arange(size) for size in sizes])
     columns = {'time': time, 'trial': trial, 'voltage': voltage, 'angle': np.ones(len(voltage))}
     angle = model.predict(Measurement.from_columns(columns))
     return Measurement.from_columns({**columns, 'angle': angle})

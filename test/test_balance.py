@@ -216,24 +216,24 @@ def reversible_balance(**effects):
     return model.balance(model.chain())
 
 
-@pytest.mark.parametrize('step, tolerance', [(0.001, 0.01), (0.02, 0.06)])
+@pytest.mark.parametrize('dt, tolerance', [(0.001, 0.01), (0.02, 0.06)])
 @pytest.mark.parametrize('effects, viscous, inertia, compliance, x', [
     ({'viscous_friction': {'b': 0.5}}, 0.5, 0.0, 0.0, 6.0),
     ({'inertia': {'I': 0.01}}, 0.0, 0.01, 0.0, 6.0),
     ({'inertia': {'I': 0.01, 'b': 0.05}}, 0.05, 0.01, 0.0, 6.0),
-    # A jerk stretches what is elastic in the muscle.
+    # An acceleration stretches what is elastic in the muscle.
     ({'inertia': {'I': 0.02}, 'series_compliance': {'compliance': 0.3}}, 0.0, 0.02, 0.3e-3, 6.0),
     ({'viscous_friction': {'b': 0.5}, 'series_compliance': {'compliance': 0.3}},
      0.5, 0.0, 0.3e-3, 6.0),
     # So hard a pull that the muscle hangs loose on the way.
     ({'inertia': {'I': 0.05, 'b': 0.02}}, 0.02, 0.05, 0.0, 14.0)])
 def test_motion_is_that_of_the_equation_of_motion(
-        effects, viscous, inertia, compliance, x, step, tolerance):
+        effects, viscous, inertia, compliance, x, dt, tolerance):
     made = reversible_balance(**effects)
     start = made.settle(4.0)
     true = free_arm(x, 0.5, viscous, inertia, start, compliance)
-    time = step * np.arange(1, int(0.5 / step) + 1)
-    seen = np.array([made.step(x, step) for _ in time])
+    time = dt * np.arange(1, int(0.5 / dt) + 1)
+    seen = np.array([made.step(x, dt) for _ in time])
     stroke = np.ptp(true(time)[0])
     assert stroke > 0.02
     assert np.max(np.abs(seen - true(time)[0])) < tolerance * stroke
@@ -341,14 +341,14 @@ def test_equal_muscles_in_parallel_are_one(names):
             assert three.output == pytest.approx(one.output, abs=1e-7)
 
 
-@pytest.mark.parametrize('yielding', [None, 0.3])
-def test_unequal_muscles_share_the_load_of_brute_force(yielding):
+@pytest.mark.parametrize('elastic', [None, 0.3])
+def test_unequal_muscles_share_the_load_of_brute_force(elastic):
     offsets = (-0.8e-3, 0.0, 1.2e-3)
     names = {'unequal_muscles': {'shorter': 0.8, 'longer': 1.2}}
     compliance = COMPLIANCE
-    if yielding:
-        names['series_compliance'] = {'compliance': yielding}
-        compliance = 1e-3 * yielding
+    if elastic:
+        names['series_compliance'] = {'compliance': elastic}
+        compliance = 1e-3 * elastic
     model = MODEL.with_effects([effect_of(MODEL, name, **values)
                                 for name, values in names.items()])
     made = model.balance(model.chain())
@@ -356,7 +356,7 @@ def test_unequal_muscles_share_the_load_of_brute_force(yielding):
     for x in [0.5, *X]:
         def lacking(theta, commit=False, x=x):
             load = GEOMETRY.force(theta)
-            stretch = compliance * load if yielding else 0.0
+            stretch = compliance * load if elastic else 0.0
             total = 0.0
             for stage, excess in zip(stages, offsets):
                 def missing(u, stage=stage, excess=excess):
@@ -383,7 +383,7 @@ def test_friction_holds_unequal_muscles_by_what_they_pull_together():
     width = 2.0 * 0.02 / leverage
     stiff = [made.step(6.0 - share * width, 30.0) - theta for share in (0.3, 0.6, 0.9)]
     assert stiff == [0.0, 0.0, 0.0]
-    # The wires yield while the arm sticks, but no more than the drive has changed.
+    # The wires stretch while the arm sticks, but no more than the drive has changed.
     tension = np.mean([operator.input + 6.0 - 0.9 * width for operator in made.operators])
     rest = GEOMETRY.load_moment(theta) / leverage
     assert rest - 0.5 * width < tension < rest
@@ -414,7 +414,7 @@ def test_bundle_stays_within_the_limits_of_its_search():
     assert place(1e9, 5.0) == 0.0
 
 
-def test_a_wire_that_hardly_yields_does_not_cut_time_into_endless_pieces():
+def test_a_stiff_wire_does_not_cut_time_into_endless_pieces():
     model = MODEL.with_effects([effect_of(MODEL, 'series_compliance', compliance=1e-290),
                                 effect_of(MODEL, 'inertia', I=0.01)])
     chain = model.chain()

@@ -117,7 +117,7 @@ def test_a_muscle_is_overdriven_evenly_and_no_more_than_the_horizon_asks():
     reference = controller.reference(1.6)
     voltage = controller.setpoint(*reference, 10.0).voltage
     steady = model.controller(arm=True).setpoint(*reference).voltage
-    # V^2 = q + (q - q0) e / (1 - e) with e what is left after the horizon.
+    # V^2 = q + (q - q0) e / (1 - e) with e the share that remains after the horizon.
     left = math.exp(-5.0 / 3.0)
     assert voltage ** 2 == pytest.approx(steady ** 2 / (1.0 - left))
     assert [controller.hold(10.0 + 0.5 * n) for n in range(1, 10)] == pytest.approx([voltage] * 9)
@@ -163,7 +163,7 @@ def test_hold_without_a_horizon_repeats_the_setpoint():
     setpoint = controller.setpoint(*controller.reference(1.5), 1.0)
     memory = controller.save()
     assert controller.hold(1.5) == controller.hold(7.0) == setpoint.voltage
-    for part in ('first', 'muscles', 'force'):
+    for part in ('first', 'second', 'force'):
         assert controller.save()[part] == memory[part]
 
 
@@ -174,7 +174,7 @@ def test_hold_leaves_the_memory_of_the_hysteresis_alone():
     voltages = {controller.hold(0.5 * n) for n in range(1, 20)}
     assert len(voltages) > 1
     after = controller.save()
-    for part in ('first', 'muscles', 'force', 'targets'):
+    for part in ('first', 'second', 'force', 'targets'):
         assert after[part] == memory[part]
     assert after['effects'][1] == memory['effects'][1]
 
@@ -255,7 +255,7 @@ def test_memory_that_does_not_fit_is_refused_and_changes_nothing():
     controller = bicep_model(['thermal_lag']).controller()
     controller.setpoint(*controller.reference(1.5), 1.0)
     good = controller.save()
-    others = [{}, {**good, 'ambient': math.nan}, {**good, 'muscles': []},
+    others = [{}, {**good, 'ambient': math.nan}, {**good, 'second': []},
               {**good, 'effects': [[], []]}, {**good, 'first': None}, {**good, 'pacing': {}},
               {**good, 'pacing': {**good['pacing'], 'travel': 'far'}},
               {**good, 'pacing': {**good['pacing'], 'drive': math.inf}},

@@ -11,7 +11,6 @@ import pytest
 from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.observable import observable
-from hysteresis_ros.diagnosis.problem import sensor_resolution
 from hysteresis_ros.diagnosis.residual import predictable, shares, unexplained_signal
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.significance import (
@@ -64,7 +63,7 @@ def test_cosines_and_what_is_left_beside_columns():
 def test_effects_that_the_bench_has_shown_may_differ_on_the_arm():
     """Those of the wire are tried again, those of the arm are not."""
     model = bicep_model(['series_compliance', 'payload_error'])
-    names, unobservable = observable(problem_for(model, [runs(model, step=0.1)]))
+    names, unobservable = observable(problem_for(model, [runs(model, dt=0.1)]))
     assert 'series_compliance' in names and 'encoder_offset' in names
     assert 'payload_error' not in {*names, *unobservable}
 
@@ -77,7 +76,7 @@ def test_what_needs_transients_is_unobservable_in_settled_rows(problem):
     assert not set(names) & set(unobservable)
     few = problem_for(problem.model, problem.measurements, ['thermal_lag', 'payload_error'])
     assert observable(few) == (['payload_error'], {'thermal_lag': 'every row is settled'})
-    moving = problem_for(problem.model, [runs(problem.model, step=0.1)])
+    moving = problem_for(problem.model, [runs(problem.model, dt=0.1)])
     assert 'thermal_lag' in observable(moving)[0]
 
 
@@ -259,7 +258,7 @@ def test_the_noise_of_a_sensor_comes_from_its_steps():
     data = Measurement.from_columns({
         'time': 30.0 * np.arange(500.0), 'trial': np.zeros(500), 'voltage': angle,
         'angle': angle})
-    assert sensor_resolution(data) == pytest.approx(0.001 / 12 ** 0.5, rel=1e-6)
+    assert problem_for(bicep_model(), [data]).noise == pytest.approx(0.001 / 12 ** 0.5, rel=1e-6)
 
 
 def test_recordings_that_do_not_go_together_are_refused():

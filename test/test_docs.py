@@ -55,3 +55,16 @@ def test_every_documented_module_is_on_a_page_of_the_contents(root):
     contents = (root / 'docs' / 'index.md').read_text(encoding='utf-8')
     for page in (root / 'docs' / 'api').glob('*.md'):
         assert f'\napi/{page.stem}\n' in contents, page.name
+
+
+def test_every_module_is_on_a_page(root):
+    """Whoever looks for a module finds it; one that is gone is on no page."""
+    pages = ''.join(page.read_text(encoding='utf-8')
+                    for page in sorted((root / 'docs' / 'api').glob('*.md')))
+    listed = re.findall(r'^\.\. automodule:: hysteresis_ros\.([\w.]+)$', pages, re.MULTILINE)
+    files = [path.relative_to(root / 'hysteresis_ros').with_suffix('')
+             for path in (root / 'hysteresis_ros').rglob('*.py')]
+    there = {'.'.join(path.parts) for path in files if not path.name.startswith('__')}
+    folders = {'.'.join(path.parent.parts) for path in files}
+    assert sorted(set(listed) - folders) == sorted(there)
+    assert len(listed) == len(set(listed))

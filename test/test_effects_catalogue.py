@@ -214,7 +214,7 @@ class Drag(SensorEffect):
         """Forget."""
         self._last = None
 
-    def step(self, value, step):
+    def step(self, value, dt):
         """Follow."""
         last = value if self._last is None else self._last
         self._last = value + self.share * (last - value)
@@ -228,7 +228,7 @@ class Swelling(MaterialEffect):
     sentence = equation = source = shows_in = experiment = 'It gets longer with time.'
     parameters = (Parameter('rate', 'm/s', 'growth', 1e-6, 1e-3, 0.0, (1e-5,)),)
 
-    def drift(self, drive, heat, inputs, surroundings):
+    def drift(self, drive, drive_squared, inputs, surroundings):
         """Grow."""
         return self.rate * inputs.time, np.ones(len(drive))
 
@@ -245,7 +245,7 @@ class Ratchet(MaterialEffect):
         """Forget."""
         self._teeth = 0
 
-    def advance(self, drive, heat, inputs, surroundings):
+    def advance(self, drive, drive_squared, inputs, surroundings):
         """Click."""
         self._teeth += 1
         return self.tooth * self._teeth, 1.0

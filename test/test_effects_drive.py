@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Effects between the drive that was set and the heat: equations, inverses, order, memory."""
+"""Effects between the drive that was set and the drive squared that the muscle feels."""
 
 import math
 
@@ -77,14 +77,14 @@ def test_ambient_temperature_that_was_not_recorded_counts_for_nothing():
     assert made.inverse(4.0, ROOM._replace(ambient=math.nan), WIRE) == 4.0
 
 
-def heat_balance(volts, step, up, down):
-    """Integrate Eq. 1 in terms of the heat, with rates of its own for heating and cooling."""
-    heat, rows = 0.0, []
+def heat_balance(volts, dt, up, down):
+    """Integrate Eq. 1 in the drive squared q, with rates of their own for heating and cooling."""
+    start, rows = 0.0, []
     for value in volts:
         def slope(_, q, value=value):
             return (up if value ** 2 > q[0] else down) * (value ** 2 - q)
-        heat = integrate.solve_ivp(slope, (0.0, step), [heat], rtol=1e-10, atol=1e-10).y[0, -1]
-        rows.append(heat)
+        start = integrate.solve_ivp(slope, (0.0, dt), [start], rtol=1e-10, atol=1e-10).y[0, -1]
+        rows.append(start)
     return np.array(rows)
 
 
@@ -114,14 +114,14 @@ def test_latent_heat_slows_heating_and_cooling_down():
 
 @given(st.lists(st.tuples(drives, st.floats(0.01, 30.0)), min_size=1, max_size=6), drives,
        st.floats(0.1, 20.0), st.sampled_from(['thermal_lag', 'heating_cooling_asymmetry']))
-def test_inverse_of_a_lag_reaches_the_heat_within_the_step(past, target, horizon, name):
+def test_inverse_of_a_lag_reaches_the_target_within_dt(past, target, horizon, name):
     values = {'time_constant': 4.0} if name == 'thermal_lag' else {
         'time_constant': 4.0, 'ratio': 0.6}
     lag = effect(name, **values)
-    for volts, step in past:
-        lag.step(volts ** 2, step, 1.0, WIRE)
+    for volts, dt in past:
+        lag.step(volts ** 2, dt, 1.0, WIRE)
     before = lag.save()
-    wanted = lag.inverse(target ** 2, ROOM._replace(step=horizon), WIRE)
+    wanted = lag.inverse(target ** 2, ROOM._replace(dt=horizon), WIRE)
     assert lag.save() == before
     assert lag.step(wanted, horizon, 1.0, WIRE) == pytest.approx(target ** 2, abs=1e-9)
 
@@ -130,8 +130,8 @@ def test_inverse_of_a_lag_without_past_or_horizon_is_the_steady_state():
     lag = effect('thermal_lag', time_constant=4.0)
     assert lag.inverse(9.0, ROOM, WIRE) == 9.0
     lag.step(4.0, 1.0, 1.0, WIRE)
-    for step in (0.0, math.inf):
-        assert lag.inverse(9.0, ROOM._replace(step=step), WIRE) == 9.0
+    for dt in (0.0, math.inf):
+        assert lag.inverse(9.0, ROOM._replace(dt=dt), WIRE) == 9.0
 
 
 def test_lag_does_not_move_in_no_time_and_arrives_in_infinite_time():
@@ -155,22 +155,24 @@ def test_a_fan_changes_gain_and_time_constant_together():
     time = 0.5 * np.arange(1, 9)
     # dq/dt = beta d1 (V^2 / beta - q)
     np.testing.assert_allclose(
-        chain.heat(volts, inputs), 25.0 / beta * (1.0 - np.exp(-beta * time / tau)), rtol=1e-12)
+        chain.drive_squared(volts, inputs), 25.0 / beta * (1.0 - np.exp(-beta * time / tau)),
+        rtol=1e-12)
 
 
-def test_the_air_adds_its_heat_undivided_by_the_fan_and_without_lag():
+def test_the_air_adds_undivided_by_the_fan_and_without_lag():
     chain = Chain([effect('ambient_temperature', gain=0.5, reference=20.0),
                    effect('airflow', beta=2.0), effect('thermal_lag', time_constant=4.0)], WIRE)
     inputs = Inputs(0.0, 0.0, np.array([1e3, 0.0]), np.array([24.0, 22.0]), np.ones(2), np.zeros(2))
-    np.testing.assert_allclose(chain.heat(np.array([4.0, 4.0]), inputs), [8.0 + 2.0, 8.0 + 1.0])
+    np.testing.assert_allclose(
+        chain.drive_squared(np.array([4.0, 4.0]), inputs), [8.0 + 2.0, 8.0 + 1.0])
 
 
 def test_effects_act_in_the_order_of_the_stages_whatever_the_order_of_the_list():
     made = [effect('airflow', beta=1.5), effect('pwm_dead_zone', Vd=1.0),
             effect('supply_sag', Rs=2.0)]
     for order in (made, made[::-1]):
-        heat = Chain(order, WIRE).step(5.0, ROOM)
-        assert heat == pytest.approx((5.0 * 0.8 - 1.0) ** 2 * (6.0 / 5.0) ** 2 / 1.5)
+        q = Chain(order, WIRE).step(5.0, ROOM)
+        assert q == pytest.approx((5.0 * 0.8 - 1.0) ** 2 * (6.0 / 5.0) ** 2 / 1.5)
 
 
 @given(drives, shares)
@@ -182,10 +184,10 @@ def test_the_whole_chain_is_undone_in_reverse(drive, phase):
     assert chain.inverse(chain.step(drive, inputs), inputs) == pytest.approx(drive, abs=1e-7)
 
 
-def test_a_drive_that_is_no_voltage_heats_in_proportion():
-    assert Chain([], WIRE._replace(drive='pressure')).to_heat(3.0) == 3.0
+def test_only_voltage_and_current_are_squared():
+    assert Chain([], WIRE._replace(drive='pressure')).to_drive_squared(3.0) == 3.0
     chain = Chain([], WIRE)
-    assert (chain.to_heat(-3.0), chain.to_drive(-9.0)) == (-9.0, -3.0)
+    assert (chain.to_drive_squared(-3.0), chain.to_drive(-9.0)) == (-9.0, -3.0)
 
 
 def test_what_another_effect_contains_is_replaced_by_it():
@@ -199,7 +201,7 @@ def test_what_another_effect_contains_is_replaced_by_it():
 def test_each_chain_has_a_memory_of_its_own_that_can_be_saved():
     lag = effect('thermal_lag', time_constant=4.0)
     one, other = Chain([lag], WIRE), Chain([lag], WIRE)
-    inputs = ROOM._replace(step=1.0)
+    inputs = ROOM._replace(dt=1.0)
     one.step(6.0, inputs)
     saved = one.save()
     later = one.step(6.0, inputs)
@@ -219,16 +221,16 @@ def test_each_chain_has_a_memory_of_its_own_that_can_be_saved():
     ('heating_cooling_asymmetry', {'time_constant': 3.0, 'ratio': 1.7}),
     ('latent_heat', {'time_constant': 2.0, 'latent': 0.4})])
 def test_a_whole_trial_is_the_same_as_step_by_step(name, values):
-    chance = np.random.default_rng(4)
-    heat, steps, phases = (chance.uniform(low, high, 40) for low, high in (
+    rng = np.random.default_rng(4)
+    signal, dt, phases = (rng.uniform(low, high, 40) for low, high in (
         (0.0, 36.0), (0.1, 4.0), (0.0, 1.0)))
     made = effect(name, **values)
-    rows = made.forward(heat, ROOM._replace(step=steps, phase=phases), WIRE)
+    rows = made.forward(signal, ROOM._replace(dt=dt, phase=phases), WIRE)
     made.start()
-    single = [made.step(*row, WIRE) for row in zip(heat.tolist(), steps.tolist(), phases.tolist())]
+    single = [made.step(*row, WIRE) for row in zip(signal.tolist(), dt.tolist(), phases.tolist())]
     np.testing.assert_allclose(rows, single, rtol=1e-12)
     # Turning to martensite gives heat off.
     if name == 'latent_heat':
         warmer = made.forward(np.zeros(2), ROOM._replace(
-            step=np.full(2, 1.0), phase=np.array([0.2, 0.7])), WIRE)
-        assert warmer[1] == pytest.approx(0.4 * 0.5 * WIRE.heat)
+            dt=np.full(2, 1.0), phase=np.array([0.2, 0.7])), WIRE)
+        assert warmer[1] == pytest.approx(0.4 * 0.5 * WIRE.full_drive_squared)

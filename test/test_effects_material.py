@@ -51,23 +51,23 @@ def test_growth_of_the_stroke_on_the_arm_counts_from_where_the_bench_model_is_ri
     assert np.all(np.diff(more) > 0.0) and np.all((more > 0.0) == (LOADS > there))
 
 
-@pytest.mark.parametrize('drive, load, unit, low, high, per_heat', [
+@pytest.mark.parametrize('drive, load, unit, low, high, expected', [
     ('voltage', 'force', 'N/V^2', 0.2, 6.0, 2.0), ('current', 'force', 'N/A^2', 1.0, 1e3, 2.0),
     ('temperature', 'stress', 'MPa/K', 5.0, 15.0, 2e6),
     ('temperature', 'force', 'N/K', 0.01, 100.0, 2.0),
     ('pressure', 'force', 'load/heat', 1e-3 / 12, 1e3 / 12, 2.0)])
-def test_clausius_clapeyron_has_the_units_of_the_table(drive, load, unit, low, high, per_heat):
+def test_clausius_clapeyron_has_the_units_of_the_table(drive, load, unit, low, high, expected):
     made = effect('stress_dependence', WIRE._replace(drive=drive, load_name=load), C=2.0)
     parameter = made.parameters[0]
     assert (parameter.unit, parameter.low, parameter.high) == (
         unit, pytest.approx(low), pytest.approx(high))
-    assert made.load_per_heat == per_heat
+    assert made.load_per_drive_squared == expected
     assert parameter.kinds == ('bench',)
-    assert effect('stress_dependence', shift=0.5).load_per_heat == 0.0
+    assert effect('stress_dependence', shift=0.5).load_per_drive_squared == 0.0
 
 
 def test_range_of_clausius_clapeyron_covers_the_wire():
-    # 5 to 15 MPa/K on a 0.203 mm wire, whose heat is 2 to 12 K/V^2.
+    # 5 to 15 MPa/K on a 0.203 mm wire, which warms by 2 to 12 K/V^2.
     area = math.pi / 4.0 * 0.203e-3 ** 2
     parameter = effect('stress_dependence').parameters[0]
     assert parameter.low < 5e6 * area * 2.0 < 15e6 * area * 12.0 < parameter.high * 1.01
@@ -149,10 +149,10 @@ def logistic(x):
 
 def test_r_phase_is_a_step_with_a_narrow_loop():
     made = effect('r_phase', strain=0.5, position=0.3, width=0.05)
-    heat = np.array([0.0, 12.0, 36.0, 12.0, 0.0])
-    offset, factor = made.drift(np.sqrt(heat), heat, inputs(range(5)), WIRE)
+    drive_squared = np.array([0.0, 12.0, 36.0, 12.0, 0.0])
+    offset, factor = made.drift(np.sqrt(drive_squared), drive_squared, inputs(range(5)), WIRE)
     half = 0.5 * 0.03 * 36.0
-    # The play lags behind the heat by half the loop's width, on both ways.
+    # The play lags behind the drive squared by half the loop's width, on both ways.
     played = [0.0, 12.0 - half, 36.0 - half, 12.0 + half, half]
     expected = [-0.005 * 0.27 * logistic((q / 36.0 - 0.3) / 0.05) for q in played]
     np.testing.assert_allclose(offset, expected, rtol=1e-12)
@@ -166,7 +166,7 @@ def test_creep_goes_on_with_the_logarithm_of_time_in_the_direction_of_the_step()
     trial = inputs([1.0, 2.0, 7.0, 8.0, 12.0], phase=[0.4, 0.4, 0.4, 0.7, 0.7])
     offset, factor = made.drift(volts, volts ** 2, trial, WIRE)
     unit = 0.001 * 0.27
-    # What the first step has left fades while the second creeps.
+    # The strain of the first step fades while the second creeps.
     left = -unit * 0.6 * math.log1p(6.0 / 2.0)
     expected = [0.0, -unit * 0.6 * math.log1p(1.0 / 2.0), left,
                 left, left * math.exp(-2.0 * 4.0 / 2.0) + unit * 0.3 * math.log1p(4.0 / 2.0)]
@@ -222,12 +222,12 @@ def test_a_muscle_that_extends_goes_the_other_way(name):
 @given(st.lists(st.tuples(st.floats(0.0, 6.0), st.floats(0.1, 50.0), st.booleans()),
                 min_size=1, max_size=12), st.sampled_from(DRIFTS))
 def test_row_by_row_is_the_same_as_the_whole_trial(rows, name):
-    volts, steps = [0.0], []
-    for value, step, held in rows:
+    volts, times = [0.0], []
+    for value, dt, held in rows:
         volts.append(volts[-1] if held else value)
-        steps.append(step)
+        times.append(dt)
     volts = np.array(volts[1:])
-    trial = inputs(np.cumsum(steps), np.cumsum(np.abs(np.diff(volts, prepend=0.0))) / 12.0,
+    trial = inputs(np.cumsum(times), np.cumsum(np.abs(np.diff(volts, prepend=0.0))) / 12.0,
                    1.0 - volts / 6.0)
     made = effect(name, **STRENGTHS[name])
     offset, factor = made.drift(volts, volts ** 2, trial, WIRE)
@@ -252,7 +252,7 @@ def test_effects_of_the_load_add_up_and_strokes_multiply():
     np.testing.assert_allclose(chain.stretch(LOADS), 1e-3 + 1e-4 * LOADS)
     np.testing.assert_allclose(
         chain.scale(LOADS), effect('stress_dependent_strain', r=0.6, F0=1.5).scale(LOADS, WIRE))
-    assert chain.load_per_heat() == 0.0
+    assert chain.load_per_drive_squared() == 0.0
     assert chain.offsets == (0.0,)
 
 

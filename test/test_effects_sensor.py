@@ -18,9 +18,9 @@ def effect(name, **values):
     return catalogue()[name](**(values or STRENGTHS[name]))
 
 
-def rows(steps):
-    time = np.cumsum(steps)
-    return Inputs(time, time, np.asarray(steps, dtype=float), *(np.full(len(time), np.nan),) * 3)
+def rows(dt):
+    time = np.cumsum(dt)
+    return Inputs(time, time, np.asarray(dt, dtype=float), *(np.full(len(time), np.nan),) * 3)
 
 
 def test_encoder_offset_adds_degrees():
@@ -56,10 +56,10 @@ def test_latency_shows_the_rest_before_a_trial_first():
     late = effect('latency', delay=0.25)
     late.start()
     late.begin(3.0)
-    response, steps = np.array([1.0, 2.0, 4.0]), [0.1, 0.2, 0.2]
-    whole = late.forward(response, rows(steps))
+    response, dt = np.array([1.0, 2.0, 4.0]), [0.1, 0.2, 0.2]
+    whole = late.forward(response, rows(dt))
     np.testing.assert_allclose(whole, [3.0, 2.0, 1.75])
-    single = [late.step(value, step) for value, step in zip(response, steps)]
+    single = [late.step(value, each) for value, each in zip(response, dt)]
     np.testing.assert_allclose(single, whole)
 
 
@@ -67,12 +67,12 @@ def test_latency_shows_the_rest_before_a_trial_first():
        st.sampled_from(['encoder_offset', 'backlash', 'latency']))
 def test_row_by_row_is_the_same_as_the_whole_trial(samples, name):
     made = effect(name)
-    response, steps = np.array(samples).T
-    whole = made.forward(response, rows(steps))
+    response, dt = np.array(samples).T
+    whole = made.forward(response, rows(dt))
     made.start()
     single = []
-    for value, step in samples:
-        single.append(made.step(value, step))
+    for value, dt in samples:
+        single.append(made.step(value, dt))
         made.restore(made.save())
     np.testing.assert_allclose(single, whole, atol=1e-12)
 

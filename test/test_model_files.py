@@ -199,4 +199,4 @@ def test_values_of_effects_depend_on_the_muscle_they_are_loaded_for(tmp_path):
     model = model.with_effects([effect_of(model, 'stress_dependence', C=8.0)])
     model.save(tmp_path / 'model.yaml')
     effect = MuscleModel.load(tmp_path / 'model.yaml').effects[0]
-    assert effect.parameters[0].unit == 'MPa/K' and effect.load_per_heat == 8e6
+    assert effect.parameters[0].unit == 'MPa/K' and effect.load_per_drive_squared == 8e6

@@ -12,7 +12,7 @@ from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import LinearModel, Simulator
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.simulation import trials_of, turning_rows
+from hysteresis_ros.model.simulation import trials_of
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY, STRENGTHS, wandering_voltage
 
 VOLTAGE = wandering_voltage(800, seed=2)
@@ -31,7 +31,7 @@ def test_trials_carry_time_clock_and_cycles():
     model = bicep_model()
     first, second = trials_of(model, table())
     assert first.inputs.time.tolist() == [30.0, 60.0, 90.0]
-    assert first.inputs.step.tolist() == [30.0, 30.0, 30.0]
+    assert first.inputs.dt.tolist() == [30.0, 30.0, 30.0]
     assert second.inputs.clock.tolist() == [120.0, 150.0]
     np.testing.assert_allclose(first.inputs.cycles, np.array([0.0, 4.0, 6.0]) / 12.0)
     # Each trial starts from no voltage.
@@ -44,7 +44,7 @@ def test_trials_carry_time_clock_and_cycles():
 def test_time_of_a_recording_counts_from_the_start_of_the_trial():
     trial, = trials_of(bicep_model(), arm_run([1.0, 2.0, 3.0], 0.5, first=0.0,
                                               ambient_temperature=[20.0, 21.0, 22.0]))
-    assert trial.inputs.step.tolist() == [0.0, 0.5, 0.5]
+    assert trial.inputs.dt.tolist() == [0.0, 0.5, 0.5]
     assert trial.inputs.ambient.tolist() == [20.0, 21.0, 22.0]
     assert trial.load.tolist() == [0.0, 0.0, 0.0]
 
@@ -117,13 +117,6 @@ def test_an_error_in_one_of_many_sets_is_raised(jobs):
         simulator.run_many([[], []], jobs=jobs)
 
 
-@pytest.mark.parametrize('x, expected', [
-    ([0.0, 1.0, 2.0, 1.0, 0.0], [1, 0, 1, 0, 1]), ([0.0, 1.0, 1.0, 0.0, 0.0], [1, 0, 1, 0, 1]),
-    ([0.0, 0.0, 1.0, 1.0, 2.0], [1, 0, 0, 0, 1]), ([3.0], [1]), ([2.0, 2.0], [1, 1])])
-def test_turns_are_where_the_direction_changes(x, expected):
-    assert turning_rows(np.array(x)).tolist() == [bool(value) for value in expected]
-
-
 def test_phase_is_in_agreement_with_the_response_it_causes():
     model = bicep_model()
     effect = effect_of(model, 'resistance_change', eta=0.05)
@@ -170,7 +163,7 @@ def test_only_what_transforms_counts_as_transformation_on_an_arm(monkeypatch):
     chain = Chain([*model.effects, creep], model.surroundings)
     # The phase that counted in the last pass is within what agreement allows of its output's.
     inputs = trial.inputs._replace(phase=model.martensite(given[-1]))
-    offset, _ = chain.drift(trial.drive, chain.heat(trial.drive, inputs), inputs)
+    offset, _ = chain.drift(trial.drive, chain.drive_squared(trial.drive, inputs), inputs)
     stretch = chain.stretch(GEOMETRY.force(angles))
     np.testing.assert_allclose(
         given[-1], GEOMETRY.length(angles) - stretch - offset, atol=2e-5)
@@ -209,12 +202,12 @@ def test_sensor_effects_reach_bench_tables():
 def test_muscle_says_what_scales_effects_refer_to():
     surroundings = bicep_model().surroundings
     assert surroundings._asdict() == {
-        'length': 0.27, 'load': 3.0, 'heat': 36.0, 'span': pytest.approx(0.0205),
+        'length': 0.27, 'load': 3.0, 'full_drive_squared': 36.0, 'span': pytest.approx(0.0205),
         'drive': 'voltage', 'load_name': 'force', 'response': 'length', 'cold': 0.0,
         'drive_range': 6.0, 'sign': -1}
     hot = bicep_model(drive='temperature', response='strain', geometry=None, sign=1,
                       ranges={'temperature': (20.0, 150.0), 'strain': (0.0, 0.04)}).surroundings
-    assert (hot.length, hot.heat, hot.cold, hot.drive_range, hot.sign) == (
+    assert (hot.length, hot.full_drive_squared, hot.cold, hot.drive_range, hot.sign) == (
         1.0, 150.0, 20.0, 130.0, 1)
     assert bicep_model(geometry=None).surroundings.length == pytest.approx(20.0 * 0.0205)
 

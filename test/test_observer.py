@@ -23,14 +23,14 @@ def observed(model, run, ambient=AMBIENT):
     return np.array([observer.step(*row) for row in zip(run.time, VOLTAGE, ambient)])
 
 
-@pytest.mark.parametrize('step', [0.2, 30.0])
+@pytest.mark.parametrize('dt', [0.2, 30.0])
 @pytest.mark.parametrize('names', [(), *((name,) for name in STRENGTHS if name not in LATE), (
     'supply_sag', 'thermal_lag', 'airflow', 'ambient_temperature', 'r_phase', 'fatigue',
     'stress_dependent_strain', 'coulomb_friction', 'viscous_friction', 'payload_error', 'latency',
     'backlash', 'encoder_offset')])
-def test_observer_is_the_simulation_row_by_row(names, step):
+def test_observer_is_the_simulation_row_by_row(names, dt):
     model = bicep_model(names)
-    run = arm_run(VOLTAGE, step, ambient_temperature=AMBIENT)
+    run = arm_run(VOLTAGE, dt, ambient_temperature=AMBIENT)
     np.testing.assert_allclose(observed(model, run), model.predict(run), rtol=0.0, atol=1e-12)
 
 

@@ -122,9 +122,9 @@ def test_the_effect_of_the_readme_is_undone_by_its_inverse(own_effect):
     assert not inspect.isabstract(own_effect)
     model = bicep_model()
     effect = own_effect(model.surroundings, p=0.2)
-    heat = np.linspace(0.0, 36.0, 7)
-    assert effect.forward(heat, None, None) == pytest.approx(0.8 * heat)
-    assert effect.inverse(effect.forward(heat, None, None), None, None) == pytest.approx(heat)
+    squared = np.linspace(0.0, 36.0, 7)
+    assert effect.forward(squared, None, None) == pytest.approx(0.8 * squared)
+    assert effect.inverse(effect.forward(squared, None, None), None, None) == pytest.approx(squared)
 
 
 def test_the_effect_of_the_readme_is_fitted_and_explained_like_any_other(own_effect, capsys):

@@ -9,7 +9,10 @@ Everything that does not change from row to row is laid out here as tables; `ker
 rest.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,12 +21,16 @@ from hysteresis_ros.bicep.wires import kernels_for, wires_of
 from hysteresis_ros.effects.stages import Statics
 from hysteresis_ros.kernels import trial
 from hysteresis_ros.kernels.arm import Arm, MOTION, State
+from hysteresis_ros.operators import HysteresisOperator
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model.chain import Chain
 
 # Between two angles of the grid the linkage is a straight line, which costs less than 1e-6 rad.
 GRID = math.radians(0.1)
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
-# Longest step of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
+# Longest dt of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
 # would not be stable.
 LONGEST_PHASE = 0.7
 # A step of x of less than this share of H2's range does not make an arm ring.
@@ -48,8 +55,8 @@ class ArmBalance:
         The arm that the geometry describes at rest, where it was computed before.
     """
 
-    def __init__(self, operator, geometry: BicepGeometry, chain, loaded: bool = True,
-                 statics: Statics | None = None):
+    def __init__(self, operator: HysteresisOperator, geometry: BicepGeometry, chain: Chain,
+                 loaded: bool = True, statics: Statics | None = None) -> None:
         statics = statics or statics_of(geometry)
         for effect in chain.mechanism:
             statics = effect.forward(statics, geometry)
@@ -79,7 +86,7 @@ class ArmBalance:
             longest=LONGEST_PHASE * math.sqrt(self.inertia / stiffness),
             heaviest=max(float(np.max(np.abs(statics.moment))), 1e-12),
             calm=CALM_STEP * (operator.upper - operator.lower),
-            # The wires of unequal muscles yield when the drive changes, even while the arm sticks.
+            # The wires of unequal muscles stretch when the drive changes, even if the arm sticks.
             rigid=not several and all(np.array_equal(line[0], lines[0][0]) for line in lines),
             strained=any(np.any(line[3] != 1.0) for line in lines), dynamic=self.has_dynamics,
             swings=swings)
@@ -151,7 +158,8 @@ def statics_of(geometry: BicepGeometry) -> Statics:
     return Statics.of(geometry, np.linspace(low, high, max(int((high - low) / GRID), 2)))
 
 
-def _line(statics, leverage, friction, base, chain, loaded) -> tuple:
+def _line(statics: Statics, leverage: np.ndarray, friction: float, base: float, chain: Chain,
+          loaded: bool) -> tuple[np.ndarray, ...]:
     """
     Return the states of the arm at rest or against a moment of friction, each shape (n,).
 
@@ -170,7 +178,8 @@ def _line(statics, leverage, friction, base, chain, loaded) -> tuple:
     return np.maximum.accumulate(demand), load, weight / leverage, 1.0 / scale
 
 
-def _muscle(chain, statics, leverage, count) -> tuple[np.ndarray, float]:
+def _muscle(chain: Chain, statics: Statics, leverage: np.ndarray, count: int
+            ) -> tuple[np.ndarray, float]:
     """Return a muscle's table over its load, shape (count, 3), and the spacing of the loads [N]."""
     loads = np.linspace(0.0, LARGEST * np.max(np.abs(statics.moment / leverage)), count)
     columns = chain.load_inside(loads), chain.scale(loads), chain.stretch(loads)

@@ -8,6 +8,7 @@ import numpy as np
 
 from hysteresis_ros.bicep.wires import kernels_for, wires_of
 from hysteresis_ros.kernels import bundle
+from hysteresis_ros.operators import HysteresisOperator
 
 
 class Bundle:
@@ -21,10 +22,11 @@ class Bundle:
     offsets : tuple of float
         Excess length dL_i [m] of each muscle.
     compliance : float
-        What a wire yields elastically [m/N]; 0 stands for a usual wire's.
+        Elastic compliance of a wire [m/N]; 0 stands for a typical wire's.
     """
 
-    def __init__(self, operator, offsets: Sequence[float], compliance: float = 0.0):
+    def __init__(self, operator: HysteresisOperator, offsets: Sequence[float],
+                 compliance: float = 0.0) -> None:
         self._wires, self.operators, self._memories = wires_of(
             operator, tuple(offsets), compliance)
         self._kernels = kernels_for(operator, bundle)

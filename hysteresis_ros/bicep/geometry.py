@@ -10,11 +10,13 @@ is taken of the whole fraction.
 
 import dataclasses
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 import yaml
 
 from hysteresis_ros.errors import ParameterError, RangeError
@@ -36,7 +38,7 @@ class BicepGeometry:
     One-link arm lifted by parallel muscles (Fig. 5).
 
     The angle theta [rad] lies between the forearm and the upward vertical; a contracting muscle
-    lowers it. Angles may be scalars or arrays of any shape.
+    lowers it. Angles may be scalars or arrays of any shape; what is returned has the same shape.
 
     Parameters
     ----------
@@ -73,7 +75,7 @@ class BicepGeometry:
     muscle_count: int = 3
     gravity: float = 9.81
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
@@ -89,7 +91,7 @@ class BicepGeometry:
                 f'geometry: muscle_count must be a whole number, not {self.muscle_count!r}')
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping, source: str = 'geometry') -> 'BicepGeometry':
+    def from_mapping(cls, mapping: Mapping[str, Any], source: str = 'geometry') -> 'BicepGeometry':
         """
         Build from a mapping with the field names as keys; keys it does not know are ignored.
 
@@ -110,7 +112,7 @@ class BicepGeometry:
             raise ParameterError(f'{source}: {error}') from None
 
     @classmethod
-    def from_yaml(cls, path) -> 'BicepGeometry':
+    def from_yaml(cls, path: str | os.PathLike[str]) -> 'BicepGeometry':
         """
         Read a plain YAML mapping, or a ROS 2 parameter file with ``ros__parameters``.
 
@@ -133,7 +135,7 @@ class BicepGeometry:
                 break
         return cls.from_mapping(content, source=str(path))
 
-    def to_mapping(self) -> dict:
+    def to_mapping(self) -> dict[str, float]:
         """Return the fields as plain numbers, ready for YAML."""
         return {name: int(value) if name == 'muscle_count' else float(value)
                 for name, value in dataclasses.asdict(self).items()}
@@ -148,17 +150,17 @@ class BicepGeometry:
         """Angle gamma between that line and the forearm [rad] (Eq. 17)."""
         return math.atan2(self.clamp_height, self.clamp_distance)
 
-    def muscle_length(self, theta):
+    def muscle_length(self, theta: ArrayLike) -> Any:
         """Length z of the muscle [m] at the angle `theta` [rad] (law of cosines in Eq. 18)."""
         c, y = self.clamp_radius, self.anchor_height
         kappa = np.asarray(theta) - self.clamp_angle
         return np.sqrt(c * c + y * y - 2.0 * c * y * np.cos(kappa))
 
-    def length(self, theta):
+    def length(self, theta: ArrayLike) -> Any:
         """Elongation ``L = z - z0`` [m] at the angle `theta` [rad] (Eq. 21, sign put right)."""
         return self.muscle_length(theta) - self.resting_length
 
-    def moment_arm(self, theta):
+    def moment_arm(self, theta: ArrayLike) -> Any:
         """
         Distance r [m] from the pivot to the muscle's line of action.
 
@@ -169,16 +171,16 @@ class BicepGeometry:
         return (self.clamp_radius * self.anchor_height * np.sin(kappa)
                 / self.muscle_length(theta))
 
-    def load_moment(self, theta):
+    def load_moment(self, theta: ArrayLike) -> Any:
         """Moment of payload and forearm about the pivot [N m] (right side of Eq. 16)."""
         mass_length = (self.payload_mass + 0.5 * self.forearm_mass) * self.forearm_length
         return mass_length * self.gravity * np.sin(theta)
 
-    def force(self, theta):
+    def force(self, theta: ArrayLike) -> Any:
         """Tension of each muscle [N] that holds the arm at the angle `theta` [rad] (Eq. 22)."""
         return self.load_moment(theta) / (self.muscle_count * self.moment_arm(theta))
 
-    def angle(self, length):
+    def angle(self, length: ArrayLike) -> Any:
         """
         Angle [rad] at which the muscle's elongation is `length` [m]: the inverse of `length`.
 

@@ -17,7 +17,7 @@ from hysteresis_ros.operators.compiled import CompiledOperator
 COMPLIANCE = 2e-4
 
 
-def wires_of(operator: HysteresisOperator, offsets: tuple, compliance: float
+def wires_of(operator: HysteresisOperator, offsets: tuple[float, ...], compliance: float
              ) -> tuple[Wires, list[HysteresisOperator], Any]:
     """
     Return parallel muscles with memories of their own.
@@ -29,7 +29,7 @@ def wires_of(operator: HysteresisOperator, offsets: tuple, compliance: float
     offsets : tuple of float
         Excess length dL_i [m] of each muscle; one entry for equal muscles.
     compliance : float
-        What a wire yields elastically [m/N]; 0 stands for a usual wire's.
+        Elastic compliance of a wire [m/N]; 0 stands for a typical wire's.
 
     Returns
     -------
@@ -48,14 +48,17 @@ def wires_of(operator: HysteresisOperator, offsets: tuple, compliance: float
         # Of other operators the wires are elastic only beyond what H2 can give.
         inside = compliance
         operator = operator.tilted(inside)
-    operators = [copy.deepcopy(operator) for _ in offsets]
+    operators: list[HysteresisOperator]
     table: Any = None
-    memories: Any = operators
+    memories: Any
     if isinstance(operator, CompiledOperator):
-        table = operator.table
-        memories = np.empty((len(operators), len(operator.memory)))
-        for row, muscle in zip(memories, operators):
+        muscles = [copy.deepcopy(operator) for _ in offsets]
+        table, memories = operator.table, np.empty((len(offsets), len(operator.memory)))
+        for row, muscle in zip(memories, muscles):
             muscle.move_memory(row)
+        operators = [*muscles]
+    else:
+        operators = memories = [copy.deepcopy(operator) for _ in offsets]
     return (Wires(table, np.array(offsets, dtype=float), float(compliance), inside, middle,
                   tolerance), operators, memories)
 

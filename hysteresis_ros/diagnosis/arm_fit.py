@@ -231,7 +231,7 @@ class Fitter:
         """
         Return a fit with its evidence, the largest over the covariances at hand.
 
-        Laplace: log p(y | set) = log p(y | x, K) + log p(x) + k/2 log 2 pi - 1/2 log |H|, with
+        Laplace: log p(y | set) = log p(y | x, K) + log p(x) + k/2 log 2 pi - 1/2 log det H, with
         H = J' K^-1 J + the prior's precision (MacKay, Information Theory, ch. 28).
         """
         mean, spread = ParameterVector(fit.effects, self.problem.kind).prior()

@@ -133,13 +133,13 @@ class BenchProblem(Problem):
 
     def _new_course(self, chain, phases) -> Course:
         model, first, load = self.model, self.model.first_stage(chain), self._load
-        cold = chain.to_heat(model.cold_drive)
+        cold = chain.to_drive_squared(model.cold_drive)
         heats, drifts = [], []
         for number, trial in enumerate(self._trials):
             inputs = trial.inputs
             if phases is not None:
                 inputs = inputs._replace(phase=phases[number])
-            heat = chain.heat(trial.drive, inputs)
+            heat = chain.drive_squared(trial.drive, inputs)
             heats += [[cold], heat]
             if chain.drifts:
                 drifts.append(chain.drift(trial.drive, heat, inputs))

@@ -3,6 +3,8 @@
 """
 Covariance of the residuals of a simulated response.
 
+::
+
     K = s^2 D + a^2 exp(-|dt| / tau) + w^2 I
 
 with D the discrepancy of the base model (`discrepancy`), a drift that is correlated in time within

@@ -132,9 +132,9 @@ def path_difference(problem, effects) -> np.ndarray:
         loads = np.linspace(np.min(ends), np.max(ends) + 1e-9 * (1.0 + np.ptp(load)), LOADS)
         column = np.empty(len(angle))
         for trial in simulator.trials:
-            heat = chain.heat(trial.drive, trial.inputs)
+            heat = chain.drive_squared(trial.drive, trial.inputs)
             first.reset()
-            x = first.simulate(np.concatenate(([chain.to_heat(model.cold_drive)], heat)))
+            x = first.simulate(np.concatenate(([chain.to_drive_squared(model.cold_drive)], heat)))
             outputs = np.stack([_held(stage, model.sign * (x - one)) for one in loads])
             moving, still = (_balance(theta, load, demand, loads, given) for given in (
                 _along(stage, model.sign, x, angle[trial.rows], theta, load), outputs))

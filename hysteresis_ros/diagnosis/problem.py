@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hysteresis_ros.effects import Effect
+from hysteresis_ros.measurements.metrics import resolution_noise
 from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.model.simulation import Simulator
 
@@ -21,14 +22,6 @@ MOST_ROWS = {'arm': 400, 'bench': 400}
 MOST_FOLDS = 4
 # Blocks for significance: about this many a recording.
 BLOCKS = 24
-
-
-def sensor_resolution(measurement) -> float:
-    """Return the standard deviation that the steps of the response's sensor cause."""
-    values = np.unique(measurement.column(measurement.response))
-    steps = np.diff(values)
-    steps = steps[steps > 1e-9 * max(np.ptp(values), 1e-300)]
-    return float(np.min(steps) / np.sqrt(12.0)) if len(steps) else 0.0
 
 
 class Problem:
@@ -62,7 +55,7 @@ class Problem:
         self.simulators = [Simulator(model, m) for m in measurements]
         self.chosen = [np.arange(0, m.rows, self.stride) for m in measurements]
         self.measured = self.pick([m.column(m.response) for m in measurements])
-        self.noise = max(sensor_resolution(m) for m in measurements)
+        self.noise = max(resolution_noise(m) for m in measurements)
         self._divide()
         self.signals = self._signals()
 

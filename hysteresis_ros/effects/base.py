@@ -16,9 +16,14 @@ import abc
 from collections.abc import Mapping
 import dataclasses
 import math
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeAlias
+
+import numpy as np
 
 from hysteresis_ros.errors import ParameterError
+
+# A number of one moment, or an array of shape (rows,) with one for each row of a trial.
+Values: TypeAlias = Any
 
 STAGES = ('electrical', 'thermal', 'material', 'mechanism', 'sensor')
 
@@ -56,12 +61,12 @@ class Parameter:
     low: float
     high: float
     neutral: float
-    starts: tuple
+    starts: tuple[float, ...]
     log: bool = False
     both_signs: bool = False
-    choices: tuple = ()
-    kinds: tuple = ('arm', 'bench')
-    limits: tuple | None = None
+    choices: tuple[float, ...] = ()
+    kinds: tuple[str, ...] = ('arm', 'bench')
+    limits: tuple[float, float] | None = None
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -89,18 +94,18 @@ class Inputs(NamedTuple):
     """
     What was recorded beside the drive, as arrays of one trial or as scalars of one moment.
 
-    `time` [s] runs from the start of the trial, `clock` [s] from the start of the recording, `step`
+    `time` [s] runs from the start of the trial, `clock` [s] from the start of the recording, `dt`
     is the time since the row before [s]; `ambient` [degC] is NaN where not recorded; `phase` is the
     martensite share (0 hot and short, 1 cold and long) of a first pass; `cycles` counts the travel
     of the drive since the recording began, in full strokes there and back.
     """
 
-    time: object
-    clock: object
-    step: object
-    ambient: object
-    phase: object
-    cycles: object
+    time: Values
+    clock: Values
+    dt: Values
+    ambient: Values
+    phase: Values
+    cycles: Values
 
 
 class Surroundings(NamedTuple):
@@ -108,15 +113,16 @@ class Surroundings(NamedTuple):
     What an effect may have to know of the muscle: scales taken from the model, never fitted.
 
     `length` is the muscle's resting length in the response's unit (1 for a strain), `load` the
-    mean load of the bench, `heat` the largest heat seen there (drive squared where the drive heats
-    a wire), `span` the response's range, `drive`, `load_name` and `response` what they are. `cold`
-    is the drive that every trial starts from, `drive_range` the width of the range seen, and `sign`
-    is -1 for a muscle that gets shorter when driven, 1 for one that gets longer.
+    mean load of the bench, `full_drive_squared` the largest drive squared seen there (the largest
+    drive where that is no voltage or current), `span` the response's range, `drive`, `load_name`
+    and `response` what they are. `cold` is the drive that every trial starts from, `drive_range`
+    the width of the range seen, and `sign` is -1 for a muscle that gets shorter when driven, 1 for
+    one that gets longer.
     """
 
     length: float
     load: float
-    heat: float
+    full_drive_squared: float
     span: float
     drive: str = 'voltage'
     load_name: str | None = 'force'
@@ -154,12 +160,13 @@ class Effect(abc.ABC):
     source: ClassVar[str]
     shows_in: ClassVar[str]
     experiment: ClassVar[str]
-    confused_with: ClassVar[tuple] = ()
-    parameters: ClassVar[tuple] = ()
+    confused_with: ClassVar[tuple[str, ...]] = ()
+    # Those of the class do for any muscle; an object has those that suit its own.
+    parameters: tuple[Parameter, ...] = ()
     # Effects whose own equation contains that of another one, which it then replaces.
-    replaces: ClassVar[tuple] = ()
+    replaces: ClassVar[tuple[str, ...]] = ()
     # Kinds of measurement in which the effect can show.
-    kinds: ClassVar[tuple] = ('arm',)
+    kinds: ClassVar[tuple[str, ...]] = ('arm',)
     # Whether only a recording with transients can show it.
     needs_transients: ClassVar[bool] = False
     # Whether the maps need the martensite share, which a first pass without them gives.
@@ -171,9 +178,9 @@ class Effect(abc.ABC):
     # Whether a controller undoes it.
     invertible: ClassVar[bool] = True
     # Names of the attributes that hold what it remembers of the past; `start` sets them.
-    memory: ClassVar[tuple] = ()
+    memory: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, surroundings: Surroundings | None = None, **values: float):
+    def __init__(self, surroundings: Surroundings | None = None, **values: float) -> None:
         self.parameters = self.describe(surroundings)
         names = [parameter.name for parameter in self.parameters]
         for name, value in values.items():
@@ -195,18 +202,18 @@ class Effect(abc.ABC):
         raise AttributeError(f'{type(self).__name__} has no attribute {name!r}')
 
     @classmethod
-    def describe(cls, surroundings: Surroundings | None) -> tuple:
+    def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Return the parameters with the units and ranges that suit the muscle."""
         return cls.parameters
 
     def start(self) -> None:
         """Forget the past: a trial starts, from the cold muscle at rest."""
 
-    def save(self) -> dict:
+    def save(self) -> dict[str, Any]:
         """Return what it remembers of the past, as plain types."""
         return {name: getattr(self, name) for name in self.memory}
 
-    def restore(self, state: Mapping) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """
         Take back what `save` returned.
 
@@ -227,7 +234,7 @@ class Effect(abc.ABC):
         ParameterError
             For a name it does not have or a value that is not finite.
         """
-        copy = type(self)(**{**self.values, **values})
+        copy = type(self)(None, **{**self.values, **values})
         copy.parameters = self.parameters
         return copy
 
@@ -237,7 +244,7 @@ class Effect(abc.ABC):
                 if self.values[parameter.name] != parameter.neutral
                 and not parameter.plausible(self.values[parameter.name], slack)]
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain types for the model file."""
         units = {parameter.name: parameter.unit for parameter in self.parameters}
         return {'id': self.id, 'parameters': {
@@ -245,7 +252,7 @@ class Effect(abc.ABC):
                    'high': self.intervals.get(name, (value, value))[1], 'unit': units[name]}
             for name, value in self.values.items()}}
 
-    def guesses(self, measured) -> list[dict]:
+    def guesses(self, measured: np.ndarray) -> list[dict]:
         """Return values by name that the measured response (n,) suggests to start a fit from."""
         return []
 

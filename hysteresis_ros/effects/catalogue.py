@@ -58,7 +58,8 @@ def _check(effect: type[Effect]) -> None:
     if not issubclass(effect, base):
         raise ParameterError(
             f'effect {name}: one of stage {effect.stage} has to be a {base.__name__}')
-    if base is DriveEffect and (effect.forward is base.forward and effect.step is base.step):
+    if (issubclass(effect, DriveEffect) and effect.forward is DriveEffect.forward
+            and effect.step is DriveEffect.step):
         raise ParameterError(f'effect {name} defines neither forward nor step')
 
 

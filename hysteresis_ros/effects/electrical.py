@@ -1,12 +1,12 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Effects between the voltage that was set and the heat in the wire."""
+"""Effects between the voltage that was set and the voltage squared that heats the wire."""
 
 import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Parameter
+from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.stages import DriveEffect
 
 ELECTRIC_DRIVES = ('voltage', 'current')
@@ -18,7 +18,7 @@ class ElectricalEffect(DriveEffect):
     stage = 'electrical'
 
     @classmethod
-    def available(cls, surroundings):
+    def available(cls, surroundings: Surroundings) -> bool:
         """Whether the drive is a voltage or a current."""
         return surroundings.drive in ELECTRIC_DRIVES
 
@@ -40,15 +40,15 @@ class SupplySag(ElectricalEffect):
     WIRE_RESISTANCE = 8.0
 
     @classmethod
-    def available(cls, surroundings):
+    def available(cls, surroundings: Surroundings) -> bool:
         """Whether the drive is a voltage: a current is the same in supply and wire."""
         return surroundings.drive == 'voltage'
 
-    def forward(self, signal, inputs, surroundings):
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Divide the voltage between series resistance and wire."""
         return signal * self.WIRE_RESISTANCE / (self.WIRE_RESISTANCE + self.Rs)
 
-    def inverse(self, signal, inputs, surroundings):
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Raise the voltage by what is lost."""
         return signal * (self.WIRE_RESISTANCE + self.Rs) / self.WIRE_RESISTANCE
 
@@ -67,16 +67,16 @@ class PwmDeadZone(ElectricalEffect):
         Parameter('Vd', 'V', 'largest voltage that has no effect', 0.05, 1.5, 0.0, (0.3, 1.0),
                   log=True),)
 
-    def forward(self, signal, inputs, surroundings):
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Cut the lower end off and stretch the rest."""
         return np.maximum(signal - self.Vd, 0.0) * self._stretch(surroundings)
 
-    def inverse(self, signal, inputs, surroundings):
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Add the dead zone again; zero stays zero."""
         return signal / self._stretch(surroundings) + self.Vd if signal > 0.0 else 0.0
 
-    def _stretch(self, surroundings):
-        full = math.sqrt(surroundings.heat)
+    def _stretch(self, surroundings: Surroundings) -> float:
+        full = math.sqrt(surroundings.full_drive_squared)
         return full / max(full - self.Vd, 1e-3 * full)
 
 
@@ -86,7 +86,7 @@ class ResistanceChange(ElectricalEffect):
     id = 'resistance_change'
     sentence = ("The wire's resistance changes as it transforms, so the same voltage heats the "
                 'two phases differently.')
-    equation = ('heat = V^2 / (1 + eta xi), xi the martensite share: V^2 / R with '
+    equation = ('Ve^2 = V^2 / (1 + eta xi), xi the martensite share: V^2 / R with '
                 'R = R_A (1 + eta xi), the hot wire as on the bench; the inverse for a current')
     source = "the paper's reference [46]: less than 15 % in phase transition"
     shows_in = 'the middle of the loop'
@@ -97,14 +97,14 @@ class ResistanceChange(ElectricalEffect):
         Parameter('eta', '1', 'resistance of martensite over that of austenite, less one',
                   0.02, 0.20, 0.0, (-0.1, 0.1), both_signs=True),)
 
-    def forward(self, signal, inputs, surroundings):
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Return the drive that heats a wire of constant resistance as much."""
         return signal * self._gain(inputs, surroundings)
 
-    def inverse(self, signal, inputs, surroundings):
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Undo the change at the phase that is to be reached."""
         return signal / float(self._gain(inputs, surroundings))
 
-    def _gain(self, inputs, surroundings):
+    def _gain(self, inputs: Inputs, surroundings: Surroundings) -> Values:
         gain = 1.0 / np.sqrt(np.maximum(1.0 + self.eta * inputs.phase, 0.1))
         return gain if surroundings.drive == 'voltage' else 1.0 / gain

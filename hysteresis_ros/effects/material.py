@@ -8,10 +8,11 @@ what a bench measures, so adding them on bench tables refits the weights of H2.
 """
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Parameter, Surroundings
+from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.kernels.creep import fade, relax
 from hysteresis_ros.kernels.play import follow
@@ -32,32 +33,34 @@ class StressDependence(MaterialEffect):
     universal = True
     SHIFT = Parameter('shift', '1', 'influence of the load against that in the bench model, less '
                       'one', 0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',))
-    # Load per heat: of a 0.2 mm wire 5 to 15 MPa/K at 2 to 12 K/V^2, of any other drive unknown.
-    RANGES = {('voltage', 'force'): ('N/V^2', 0.2, 6.0), ('current', 'force'): ('N/A^2', 1., 1e3),
-              ('temperature', 'stress'): ('MPa/K', 5.0, 15.0),
-              ('temperature', 'force'): ('N/K', 0.01, 100.0)}
+    # Load per drive squared: of a 0.2 mm wire 5 to 15 MPa/K at 2 to 12 K/V^2, of others not known.
+    RANGES: ClassVar[dict[tuple[str, str | None], tuple[str, float, float]]] = {
+        ('voltage', 'force'): ('N/V^2', 0.2, 6.0), ('current', 'force'): ('N/A^2', 1.0, 1e3),
+        ('temperature', 'stress'): ('MPa/K', 5.0, 15.0),
+        ('temperature', 'force'): ('N/K', 0.01, 100.0)}
     PREFIX = {'MPa/K': 1e6}
 
     @classmethod
-    def describe(cls, surroundings):
+    def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Give C the unit and range of this muscle's load and drive."""
         if surroundings is None:
             surroundings = Surroundings(1.0, 1.0, 1.0, 1.0)
-        scale = (surroundings.load or 1.0) / (surroundings.heat or 1.0)
+        scale = (surroundings.load or 1.0) / (surroundings.full_drive_squared or 1.0)
         unit, low, high = cls.RANGES.get((surroundings.drive, surroundings.load_name),
                                          ('load/heat', 1e-3 * scale, 1e3 * scale))
         starts = tuple(float(value) for value in np.geomspace(low, high, 5)[1:-1])
-        return (Parameter('C', unit, 'load that shifts the transformation by one unit of heat',
+        return (Parameter('C', unit,
+                          'load that shifts the transformation by one unit of drive squared',
                           low, high, 0.0, starts, log=True, kinds=('bench',)), cls.SHIFT)
 
     parameters = (SHIFT,)
 
     @property
-    def load_per_heat(self) -> float:
-        """Return C in units of load over heat; 0 keeps the model's own first stage."""
+    def load_per_drive_squared(self) -> float:  # type: ignore[override]
+        """Return C in units of load over drive squared; 0 keeps the model's own first stage."""
         return self.C * self.PREFIX.get(self.parameters[0].unit, 1.0)
 
-    def shift_load(self, load, surroundings):
+    def shift_load(self, load: Values, surroundings: Surroundings) -> Values:
         """Weigh the load more or less than the bench model does."""
         # Where C is known, another one leaves the unloaded muscle as it is; weights that were
         # fitted without it are right at the bench's mean load.
@@ -65,7 +68,7 @@ class StressDependence(MaterialEffect):
         return self.shift * (load - pivot)
 
     @classmethod
-    def available(cls, surroundings):
+    def available(cls, surroundings: Surroundings) -> bool:
         """Whether a load was there at all."""
         return surroundings.load > 0.0
 
@@ -92,18 +95,18 @@ class StressDependentStrain(MaterialEffect):
         Parameter('growth', '1', 'growth of the strain with the load against that on the bench',
                   0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',)),)
 
-    def scale(self, load, surroundings):
+    def scale(self, load: Values, surroundings: Surroundings) -> Values:
         """Grow with the load, one at the bench's mean load."""
-        left = np.exp(-np.maximum(load, 0.0) / (self.F0 * surroundings.load))
+        missing = np.exp(-np.maximum(load, 0.0) / (self.F0 * surroundings.load))
         at_mean = math.exp(-1.0 / self.F0)
         # As for the shift of `stress_dependence`.
         pivot = 1.0 if self.r else at_mean
-        share = 1.0 - self.r * left + self.growth * (pivot - left)
+        share = 1.0 - self.r * missing + self.growth * (pivot - missing)
         # A stroke of nothing could not be inverted.
         return np.maximum(share, 0.02) / max(1.0 - self.r * at_mean, 0.02)
 
     @classmethod
-    def available(cls, surroundings):
+    def available(cls, surroundings: Surroundings) -> bool:
         """Whether a load was there at all."""
         return surroundings.load > 0.0
 
@@ -132,7 +135,7 @@ class SeriesCompliance(MaterialEffect):
               ('length', 'stress'): ('mm/MPa', 'elongation per stress', 0.0002, 0.02)}
 
     @classmethod
-    def describe(cls, surroundings):
+    def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Give the compliance the unit of this muscle's response and load."""
         if surroundings is None:
             return cls.parameters
@@ -143,12 +146,12 @@ class SeriesCompliance(MaterialEffect):
         starts = float(np.sqrt(low * high)), 0.3 * high
         return (Parameter('compliance', unit, meaning, low, high, 0.0, starts, log=True),)
 
-    def stretch(self, load, surroundings):
+    def stretch(self, load: Values, surroundings: Surroundings) -> Values:
         """Return the elastic elongation."""
         return self.compliance * self.UNITS[self.parameters[0].unit] * load
 
     @classmethod
-    def available(cls, surroundings):
+    def available(cls, surroundings: Surroundings) -> bool:
         """Whether a load was there at all."""
         return surroundings.load > 0.0
 
@@ -158,7 +161,7 @@ class RPhase(MaterialEffect):
 
     id = 'r_phase'
     sentence = 'A part of the strain comes early, in a narrow step with little hysteresis.'
-    equation = 'L -= p l0 s((q -+ w/2 - q0) / d), s the logistic step, q the heat, w = 3 %'
+    equation = 'L -= p l0 s((q -+ w/2 - q0) / d), s the logistic step, q the drive squared, w = 3 %'
     source = 'R-phase transformation of NiTi: 0.3 to 1 % strain, 2 to 5 K hysteresis'
     shows_in = 'a shoulder on cooling at low load'
     experiment = 'a fine staircase of cooling steps'
@@ -166,34 +169,36 @@ class RPhase(MaterialEffect):
     kinds = ('arm', 'bench')
     parameters = (
         Parameter('strain', '% of l0', 'strain of the step', 0.05, 1.0, 0.0, (0.2, 0.5), log=True),
-        Parameter('position', '1', 'heat q0 at the step over the largest heat', 0.05, 0.8, 0.3,
+        Parameter('position', '1', 'drive squared q0 at the step over the largest', 0.05, 0.8, 0.3,
                   (0.15, 0.35, 0.55)),
-        Parameter('width', '1', 'width d of the step over the largest heat', 0.005, 0.1, 0.03,
-                  (0.03,), log=True),)
+        Parameter('width', '1', 'width d of the step over the largest drive squared', 0.005, 0.1,
+                  0.03, (0.03,), log=True),)
 
     memory = ('_played',)
 
-    # Width w of the step's own hysteresis over the largest heat.
+    # Width w of the step's own hysteresis over the largest drive squared.
     LOOP = 0.03
 
-    def start(self):
+    def start(self) -> None:
         """Forget the past: cold."""
         self._played = 0.0
 
-    def advance(self, drive, heat, inputs, surroundings):
+    def advance(self, drive: float, drive_squared: float, inputs: Inputs,
+                surroundings: Surroundings) -> tuple[float, float]:
         """Return the strain of the step, with a small play as its hysteresis."""
-        half = 0.5 * self.LOOP * surroundings.heat
-        self._played = min(max(self._played, heat - half), heat + half)
+        half = 0.5 * self.LOOP * surroundings.full_drive_squared
+        self._played = min(max(self._played, drive_squared - half), drive_squared + half)
         return float(self._strain(self._played, surroundings)), 1.0
 
-    def drift(self, drive, heat, inputs, surroundings):
+    def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,
+              surroundings: Surroundings) -> tuple[np.ndarray, np.ndarray]:
         """Return the same for a whole trial at once."""
-        half = 0.5 * self.LOOP * surroundings.heat
-        played = follow(np.ascontiguousarray(heat, float), half, 0.0)
+        half = 0.5 * self.LOOP * surroundings.full_drive_squared
+        played = follow(np.ascontiguousarray(drive_squared, float), half, 0.0)
         return self._strain(played, surroundings), np.ones(len(drive))
 
-    def _strain(self, heat, surroundings):
-        argument = (heat / surroundings.heat - self.position) / self.width
+    def _strain(self, drive_squared: Values, surroundings: Surroundings) -> Values:
+        argument = (drive_squared / surroundings.full_drive_squared - self.position) / self.width
         step = 0.5 * (1.0 + np.tanh(0.5 * argument))
         return surroundings.sign * self.strain / 100.0 * surroundings.length * step
 
@@ -223,7 +228,11 @@ class Creep(MaterialEffect):
                   'transformation; 1: it goes on, as in a polymer', 0.0, 1.0, 0.0, (0.0, 1.0),
                   choices=(0.0, 1.0)),)
 
-    memory = ('_since', '_drive', '_phase', '_before', '_direction', '_crept', '_left', '_modes')
+    # When the last step was [s], and the drive before; None before a trial.
+    _since: float | None
+    _drive: float | None
+
+    memory = ('_since', '_drive', '_phase', '_before', '_direction', '_crept', '_carried', '_modes')
 
     # The logarithm as a sum of relaxations, each this many times slower than the one before.
     MODES, RATIO = 6, 3.0
@@ -231,39 +240,41 @@ class Creep(MaterialEffect):
     # A change of the drive by less than this share of its range is a hold.
     HOLD = 1e-3
 
-    # How much faster than t0 what earlier steps have left fades.
+    # How much faster than t0 the strain of earlier steps fades.
     FADING = 2.0
 
-    def start(self):
+    def start(self) -> None:
         """Forget the past: cold, before the first step."""
         self._since = self._drive = None
         self._phase = self._before = 1.0
-        self._direction = self._crept = self._left = 0.0
+        self._direction = self._crept = self._carried = 0.0
         self._modes = [0.0] * self.MODES
 
-    def advance(self, drive, heat, inputs, surroundings):
+    def advance(self, drive: float, drive_squared: float, inputs: Inputs,
+                surroundings: Surroundings) -> tuple[float, float]:
         """Return the strain since the last step, in that step's direction."""
         if self.kept:
-            return self._relax(inputs.phase, inputs.step, surroundings), 1.0
+            return self._relax(inputs.phase, inputs.dt, surroundings), 1.0
         # A ramp is many small steps: what a hold after it shows is the whole ramp's.
         change = drive - (surroundings.cold if self._drive is None else self._drive)
         direction = 0.0
         if abs(change) > self.HOLD * surroundings.drive_range:
             direction = math.copysign(1.0, change)
-        self._left *= math.exp(-self.FADING * inputs.step / self.t0)
+        self._carried *= math.exp(-self.FADING * inputs.dt / self.t0)
         if direction != 0.0:
             if direction != self._direction:
                 self._before = self._phase
-                self._left += self._crept
+                self._carried += self._crept
             self._since = inputs.time
         self._direction, self._drive, self._phase = direction, drive, inputs.phase
         if self._since is None:
             return 0.0, 1.0
         self._crept = float(self._strain(
             inputs.phase - self._before, inputs.time - self._since, surroundings))
-        return self._left + self._crept, 1.0
+        return self._carried + self._crept, 1.0
 
-    def drift(self, drive, heat, inputs, surroundings):
+    def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,
+              surroundings: Surroundings) -> tuple[np.ndarray, np.ndarray]:
         """Return the same for a whole trial at once."""
         if self.kept:
             return self._relaxed(inputs, surroundings), np.ones(len(drive))
@@ -277,38 +288,38 @@ class Creep(MaterialEffect):
         before = np.concatenate(([1.0], inputs.phase))[begun]
         held = np.where(last >= 0, inputs.time - inputs.time[last], 0.0)
         strain = self._strain(inputs.phase - before, held, surroundings)
-        clock = self.FADING / self.t0 * np.cumsum(inputs.step)
+        clock = self.FADING / self.t0 * np.cumsum(inputs.dt)
         return strain + fade(strain, turned, clock), np.ones(len(drive))
 
-    def _times(self):
+    def _times(self) -> np.ndarray:
         """Return the time constant [s] of each relaxation, (modes,)."""
         # With this first time the sum comes to the logarithm, not beside it, in the long run.
         return 3.0 * self.t0 * self.RATIO ** np.arange(self.MODES)
 
-    def _relax(self, phase, step, surroundings):
+    def _relax(self, phase: float, dt: float, surroundings: Surroundings) -> float:
         """Bring all relaxations nearer to the phase, and return their strain."""
         if math.isfinite(phase):
             target = phase - 1.0
-            decays = np.exp(-step / self._times())
+            decays = np.exp(-dt / self._times())
             self._modes = (target + (np.array(self._modes) - target) * decays).tolist()
         return self._strain_of_modes(sum(self._modes), surroundings)
 
-    def _relaxed(self, inputs, surroundings):
+    def _relaxed(self, inputs: Inputs, surroundings: Surroundings) -> np.ndarray:
         """Return what `_relax` does for a whole trial."""
         self.start()
         modes = np.array(self._modes)
         # Where the phase is not known, nothing relaxes.
         targets = np.where(np.isfinite(inputs.phase), inputs.phase - 1.0, np.nan)
-        steps = np.ascontiguousarray(inputs.step, float)
-        total = relax(targets, steps, self._times(), modes)
+        dt = np.ascontiguousarray(inputs.dt, float)
+        total = relax(targets, dt, self._times(), modes)
         self._modes = modes.tolist()
         return self._strain_of_modes(total, surroundings)
 
-    def _strain_of_modes(self, total, surroundings):
+    def _strain_of_modes(self, total: Values, surroundings: Surroundings) -> Values:
         strain = self.c / 100.0 * math.log(self.RATIO) * total
         return -surroundings.sign * surroundings.length * strain
 
-    def _strain(self, change, held, surroundings):
+    def _strain(self, change: Values, held: Values, surroundings: Surroundings) -> Values:
         """Return it for a change of the phase; nothing where that is not known."""
         strain = self.c / 100.0 * np.nan_to_num(change) * np.log1p(held / self.t0)
         return -surroundings.sign * surroundings.length * strain
@@ -336,22 +347,28 @@ class Fatigue(MaterialEffect):
 
     memory = ('_begun',)
 
-    def start(self):
+    # Cycles at the start of the trial; None before its first row.
+    _begun: float | None
+
+    def start(self) -> None:
         """Begin a trial."""
         self._begun = None
 
-    def advance(self, drive, heat, inputs, surroundings):
+    def advance(self, drive: float, drive_squared: float, inputs: Inputs,
+                surroundings: Surroundings) -> tuple[float, float]:
         """Return drift and stroke for the cycles counted since recording or trial began."""
-        if self._begun is None:
-            self._begun = 0.0 if self.kept else inputs.cycles
-        return self._worn(inputs.cycles - self._begun, surroundings)
+        begun = self._begun
+        if begun is None:
+            begun = self._begun = 0.0 if self.kept else inputs.cycles
+        return self._worn(inputs.cycles - begun, surroundings)
 
-    def drift(self, drive, heat, inputs, surroundings):
+    def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,
+              surroundings: Surroundings) -> tuple[np.ndarray, np.ndarray]:
         """Return the same for a whole trial at once."""
         begun = 0.0 if self.kept else inputs.cycles[0]
         return self._worn(inputs.cycles - begun, surroundings)
 
-    def _worn(self, cycles, surroundings):
+    def _worn(self, cycles: Values, surroundings: Surroundings) -> tuple[Values, Values]:
         logarithm = np.log1p(cycles)
         offset = -self.b / 100.0 * surroundings.length * logarithm
         return offset, np.maximum(1.0 - self.a * logarithm, 0.1)
@@ -370,7 +387,7 @@ class Slack(MaterialEffect):
     parameters = (
         Parameter('Ls', 'mm', 'dead length', 0.1, 5.0, 0.0, (0.5, 2.0), log=True),)
 
-    def stretch(self, load, surroundings):
+    def stretch(self, load: Values, surroundings: Surroundings) -> Values:
         """Return the dead length, the same under any load; that a wire cannot push holds anyway."""
         return 1e-3 * self.Ls + 0.0 * load
 
@@ -392,7 +409,7 @@ class UnequalMuscles(MaterialEffect):
                   (0.5, 2.0)),)
 
     @property
-    def offsets(self) -> tuple:
+    def offsets(self) -> tuple[float, ...]:     # type: ignore[override]
         """Excess length [m] of each muscle; equal ones count as one."""
         if self.shorter == self.longer == 0.0:
             return (0.0,)

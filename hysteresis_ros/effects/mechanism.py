@@ -7,11 +7,12 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Parameter
+from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.effects.base import Parameter, Values
 from hysteresis_ros.effects.stages import MechanismEffect, Statics
 
 
-def add_moment(statics: Statics, moment) -> Statics:
+def add_moment(statics: Statics, moment: Values) -> Statics:
     """Return the arm at rest with a further moment [N m], shape (n,), to be held."""
     return dataclasses.replace(statics, moment=statics.moment + moment)
 
@@ -30,7 +31,7 @@ class CoulombFriction(MechanismEffect):
         Parameter('tau_c', 'N m', 'moment of friction', 0.001, 0.15, 0.0, (0.01, 0.05),
                   log=True),)
 
-    def resistance(self):
+    def resistance(self) -> tuple[float, float, float]:
         """Return the friction's moment."""
         return self.tau_c, 0.0, 0.0
 
@@ -51,7 +52,7 @@ class ViscousFriction(MechanismEffect):
         Parameter('b', 'N m s/rad', 'moment per angular velocity', 0.001, 4.0, 0.0, (0.05, 1.0),
                   log=True),)
 
-    def resistance(self):
+    def resistance(self) -> tuple[float, float, float]:
         """Return the viscous coefficient."""
         return 0.0, self.b, 0.0
 
@@ -75,7 +76,7 @@ class Inertia(MechanismEffect):
         Parameter('b', 'N m s/rad', 'moment per angular velocity, by which the ringing dies away',
                   0.001, 4.0, 0.0, (0.05,), log=True),)
 
-    def resistance(self):
+    def resistance(self) -> tuple[float, float, float]:
         """Return viscous coefficient and moment of inertia."""
         return 0.0, self.b, self.I
 
@@ -94,7 +95,7 @@ class FrameTilt(MechanismEffect):
         Parameter('phi', 'deg', 'angle by which the frame leans forward', 1.0, 25.0, 0.0,
                   (-5.0, 5.0), both_signs=True),)
 
-    def forward(self, statics, geometry):
+    def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Turn the load's moment, and the direction in which other weights pull."""
         upright = statics.upright + math.radians(self.phi)
         turned = geometry.load_moment(upright) - geometry.load_moment(statics.upright)
@@ -115,7 +116,7 @@ class PayloadError(MechanismEffect):
         Parameter('dm', 'g', 'payload above the assumed one', 5.0, 100.0, 0.0, (-20.0, 20.0),
                   both_signs=True),)
 
-    def forward(self, statics, geometry):
+    def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Add the weight's moment."""
         arm = geometry.gravity * geometry.forearm_length * np.sin(statics.upright)
         return add_moment(statics, 1e-3 * self.dm * arm)
@@ -136,7 +137,7 @@ class ClampMass(MechanismEffect):
         Parameter('phi', 'rad', 'direction of its centre against the forearm', 0.0, math.pi, 0.0,
                   (0.0, 1.5), both_signs=True),)
 
-    def forward(self, statics, geometry):
+    def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Add the clamp's moment."""
         return add_moment(statics, 1e-3 * self.moment * geometry.gravity
                           * np.sin(statics.upright + self.phi))
@@ -161,7 +162,7 @@ class GeometryError(MechanismEffect):
         Parameter('dz', 'mm', 'anchor higher, or muscle shorter, than assumed', 0.0, 5.0, 0.0,
                   (0.0,), both_signs=True),)
 
-    def forward(self, statics, geometry):
+    def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Replace length and moment arm by those of the other linkage."""
         built = dataclasses.replace(
             geometry,
@@ -195,12 +196,12 @@ class EndStop(MechanismEffect):
         Parameter('stiffness', 'N m/rad', 'stiffness of the stop', 1.0, 1000.0, 0.0, (5.0,),
                   log=True),)
 
-    def guesses(self, measured):
+    def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
         """Where the response ends there may be a stop."""
         return [{'stop': float(np.max(measured)), 'side': 1.0},
                 {'stop': float(np.min(measured)), 'side': -1.0}]
 
-    def forward(self, statics, geometry):
+    def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Let the stop carry the load beyond it."""
         beyond = np.maximum(self.side * (statics.theta - self.stop), 0.0)
         return add_moment(statics, -self.side * self.stiffness * beyond)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Parameter
+from hysteresis_ros.effects.base import Inputs, Parameter
 from hysteresis_ros.effects.stages import SensorEffect
 from hysteresis_ros.kernels.play import follow
 
@@ -26,15 +26,15 @@ class EncoderOffset(SensorEffect):
         Parameter('offset', 'deg', 'measured less true angle', 0.2, 15.0, 0.0, (-2.0, 2.0),
                   both_signs=True),)
 
-    def forward(self, response, inputs):
+    def forward(self, response: np.ndarray, inputs: Inputs) -> np.ndarray:
         """Add the offset."""
         return response + math.radians(self.offset)
 
-    def step(self, value, step):
+    def step(self, value: float, dt: float) -> float:
         """Add the offset."""
         return value + math.radians(self.offset)
 
-    def inverse(self, response):
+    def inverse(self, response: float) -> float:
         """Take the offset away."""
         return response - math.radians(self.offset)
 
@@ -55,21 +55,24 @@ class Backlash(SensorEffect):
 
     memory = ('_state', '_target', '_lead')
 
-    def start(self):
+    # Where the encoder is, and the target before; None before a trial.
+    _state: float | None
+    _target: float | None
+
+    def start(self) -> None:
         """Forget the past: the play is centred at the first sample."""
         self._state = None
         self._target = None
         self._lead = 0.0
 
-    def step(self, value, step):
+    def step(self, value: float, dt: float) -> float:
         """Move the encoder only when the play is used up."""
         half = 0.5 * math.radians(self.B)
-        if self._state is None:
-            self._state = value
-        self._state = min(max(self._state, value - half), value + half)
+        state = value if self._state is None else self._state
+        self._state = min(max(state, value - half), value + half)
         return self._state
 
-    def forward(self, response, inputs):
+    def forward(self, response: np.ndarray, inputs: Inputs) -> np.ndarray:
         """Do what `step` does for a whole trial."""
         self.start()
         course = follow(np.ascontiguousarray(response, float), 0.5 * math.radians(self.B),
@@ -77,7 +80,7 @@ class Backlash(SensorEffect):
         self._state = float(course[-1])
         return course
 
-    def inverse(self, response):
+    def inverse(self, response: float) -> float:
         """Go further by half the play in the direction of the motion."""
         if self._target is not None and response != self._target:
             self._lead = math.copysign(0.5 * math.radians(self.B), response - self._target)
@@ -102,26 +105,29 @@ class Latency(SensorEffect):
 
     memory = ('_past',)
 
-    def forward(self, response, inputs):
+    # Age [s] and response of what was seen, oldest first.
+    _past: list[list[float]]
+
+    def forward(self, response: np.ndarray, inputs: Inputs) -> np.ndarray:
         """Read the response of a moment ago."""
         time = inputs.time
         if self._past:
             # Before the trial the muscle was at rest.
-            time = np.append(time[0] - inputs.step[0], time)
+            time = np.append(time[0] - inputs.dt[0], time)
             response = np.append(self._past[-1][1], response)
         return np.interp(inputs.time - self.delay, time, response)
 
-    def start(self):
+    def start(self) -> None:
         """Forget the past."""
         self._past = []
 
-    def begin(self, rest):
+    def begin(self, rest: float) -> None:
         """See the state of rest until what follows it arrives."""
         self._past = [[0.0, rest]]
 
-    def step(self, value, step):
+    def step(self, value: float, dt: float) -> float:
         """Interpolate in what was seen within the delay."""
-        past = [[age + step, old] for age, old in self._past]
+        past = [[age + dt, old] for age, old in self._past]
         past.append([0.0, value])
         # One sample beyond the delay is needed, none before that.
         beyond = sum(age >= self.delay for age, _ in past)

@@ -4,32 +4,36 @@
 
 import dataclasses
 import math
+from typing import ClassVar
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Effect, Inputs, Surroundings
+from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.effects.base import Effect, Inputs, Surroundings, Values
 
 
 class DriveEffect(Effect):
     """
     Effect between the drive that was set and the steady-state drive that the muscle feels.
 
-    An electrical effect maps the drive, a thermal one the heat (the drive squared where it is a
-    voltage or a current, the drive itself where it is a temperature, pressure or power). One
-    without a past defines `forward`, one with a past `step` and `start`; the other follows.
+    An electrical effect maps the drive, a thermal one the drive squared (the drive itself where it
+    is a temperature, pressure or power). One without a past defines `forward`, one with a past
+    `step` and `start`; the other follows.
     """
 
+    # The product of `exchange` of all thermal effects; the chain sets it in each of them.
+    speed: float
     # Heat exchange with the air over that of the bench, which every lag of the model follows.
     exchange: float = 1.0
 
-    def forward(self, signal, inputs: Inputs, surroundings: Surroundings):
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """
         Map the signal of one trial.
 
         Parameters
         ----------
         signal : ndarray, shape (rows,)
-            Drive or heat; an effect without a past takes a scalar as well.
+            Drive or drive squared; an effect without a past takes a scalar as well.
         inputs : Inputs
             Of the same shape.
         surroundings : Surroundings
@@ -40,22 +44,21 @@ class DriveEffect(Effect):
         ndarray, shape (rows,)
         """
         self.start()
-        steps = np.broadcast_to(inputs.step, np.shape(signal)).tolist()
+        times = np.broadcast_to(inputs.dt, np.shape(signal)).tolist()
         phases = np.broadcast_to(inputs.phase, np.shape(signal)).tolist()
-        return np.array([self.step(value, step, phase, surroundings)
-                         for value, step, phase in zip(signal.tolist(), steps, phases)])
+        return np.array([self.step(value, dt, phase, surroundings)
+                         for value, dt, phase in zip(signal.tolist(), times, phases)])
 
-    def step(self, value: float, step: float, phase: float,
-             surroundings: Surroundings) -> float:
-        """Advance by `step` [s] under the constant input `value`; `phase` as in `Inputs`."""
-        inputs = Inputs(0.0, 0.0, step, math.nan, phase, 0.0)
+    def step(self, value: float, dt: float, phase: float, surroundings: Surroundings) -> float:
+        """Advance by `dt` [s] under the constant input `value`; `phase` as in `Inputs`."""
+        inputs = Inputs(0.0, 0.0, dt, math.nan, phase, 0.0)
         return float(self.forward(value, inputs, surroundings))
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """
         Return the input for which the output becomes `signal`; identity if not possible.
 
-        For an effect with a past: the input that, held for ``inputs.step`` seconds, brings the
+        For an effect with a past: the input that, held for ``inputs.dt`` seconds, brings the
         output there.
         """
         return signal
@@ -71,31 +74,32 @@ class MaterialEffect(Effect):
     """
 
     stage = 'material'
-    # Load per heat that takes the place of the first stage; 0 leaves it as it is.
-    load_per_heat: float = 0.0
+    # Load per drive squared that takes the place of the first stage; 0 leaves it as it is.
+    load_per_drive_squared: float = 0.0
     # Excess length [m] of each parallel muscle.
-    offsets: tuple = (0.0,)
+    offsets: tuple[float, ...] = (0.0,)
 
-    def shift_load(self, load, surroundings: Surroundings):
+    def shift_load(self, load: Values, surroundings: Surroundings) -> Values:
         """Return what is added to the load inside the transformation, in units of the load."""
         return 0.0 * load
 
-    def scale(self, load, surroundings: Surroundings):
+    def scale(self, load: Values, surroundings: Surroundings) -> Values:
         """Return S, the factor on the transformation strain under `load`."""
         return 1.0 + 0.0 * load
 
-    def stretch(self, load, surroundings: Surroundings):
+    def stretch(self, load: Values, surroundings: Surroundings) -> Values:
         """Return e, the elongation under `load` that does not depend on the transformation."""
         return 0.0 * load
 
-    def drift(self, drive, heat, inputs: Inputs, surroundings: Surroundings):
+    def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,
+              surroundings: Surroundings) -> tuple[np.ndarray, np.ndarray]:
         """
         Return what time and history add in one trial.
 
         Parameters
         ----------
-        drive, heat : ndarray, shape (rows,)
-            The drive that was set and the heat that the muscle feels.
+        drive, drive_squared : ndarray, shape (rows,)
+            The drive that was set, and the drive squared that the muscle feels.
         inputs : Inputs
             Of the same shape.
         surroundings : Surroundings
@@ -110,17 +114,18 @@ class MaterialEffect(Effect):
             return np.zeros(len(drive)), np.ones(len(drive))
         self.start()
         columns = [np.broadcast_to(column, np.shape(drive)).tolist()
-                   for column in (drive, heat, *inputs)]
+                   for column in (drive, drive_squared, *inputs)]
         added = [self.advance(value, felt, Inputs(*row), surroundings)
                  for value, felt, *row in zip(*columns)]
-        return tuple(np.array(added, dtype=float).reshape(-1, 2).T)
+        offset, factor = np.array(added, dtype=float).reshape(-1, 2).T
+        return offset, factor
 
-    def advance(self, drive: float, heat: float, inputs: Inputs,
+    def advance(self, drive: float, drive_squared: float, inputs: Inputs,
                 surroundings: Surroundings) -> tuple[float, float]:
         """Return `drift` of the next row; an effect with a past defines this and `start`."""
         if type(self).drift is MaterialEffect.drift:
             return 0.0, 1.0
-        offset, factor = self.drift(np.array([drive]), np.array([heat]),
+        offset, factor = self.drift(np.array([drive]), np.array([drive_squared]),
                                     Inputs(*(np.array([value]) for value in inputs)), surroundings)
         return float(offset[0]), float(factor[0])
 
@@ -142,7 +147,7 @@ class Statics:
     upright: np.ndarray
 
     @classmethod
-    def of(cls, geometry, theta: np.ndarray) -> 'Statics':
+    def of(cls, geometry: BicepGeometry, theta: np.ndarray) -> 'Statics':
         """Return the arm that the geometry describes, without any effect."""
         return cls(theta, geometry.length(theta), geometry.moment_arm(theta),
                    geometry.load_moment(theta), theta)
@@ -153,7 +158,7 @@ class MechanismEffect(Effect):
 
     stage = 'mechanism'
 
-    def forward(self, statics: Statics, geometry) -> Statics:
+    def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Return the arm at rest with the effect; by default unchanged."""
         return statics
 
@@ -182,25 +187,24 @@ class SensorEffect(Effect):
     """
 
     stage = 'sensor'
-    kinds = ('arm', 'bench')
+    kinds: ClassVar[tuple[str, ...]] = ('arm', 'bench')
 
     def begin(self, rest: float) -> None:
         """Take up the true response of the state of rest before a trial, after `start`."""
 
-    def forward(self, response, inputs: Inputs):
+    def forward(self, response: Values, inputs: Inputs) -> Values:
         """Map the response of one trial, shape (rows,)."""
         if type(self).step is SensorEffect.step:
             return response
         self.start()
-        steps = np.broadcast_to(inputs.step, np.shape(response)).tolist()
-        return np.array([self.step(value, step)
-                         for value, step in zip(response.tolist(), steps)])
+        times = np.broadcast_to(inputs.dt, np.shape(response)).tolist()
+        return np.array([self.step(value, dt) for value, dt in zip(response.tolist(), times)])
 
-    def step(self, value: float, step: float) -> float:
-        """Advance by one sample taken `step` seconds after the one before."""
+    def step(self, value: float, dt: float) -> float:
+        """Advance by one sample taken `dt` seconds after the one before."""
         if type(self).forward is SensorEffect.forward:
             return value
-        inputs = Inputs(*(np.array([entry]) for entry in (0., 0., step, math.nan, math.nan, 0.)))
+        inputs = Inputs(*(np.array([entry]) for entry in (0., 0., dt, math.nan, math.nan, 0.)))
         return float(self.forward(np.array([value]), inputs)[0])
 
     def inverse(self, response: float) -> float:

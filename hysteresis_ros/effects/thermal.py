@@ -3,9 +3,9 @@
 """
 Effects on the heat balance of Eq. 1, ``dT/dt = -d1 (T - T0) + d2 V^2``.
 
-They work on the heat: the steady-state voltage squared, ``q = Vs^2 = (d1/d2) (T - T0)``, in which
-Eq. 1 reads ``dq/dt = d1 (V^2 - q)``. For a drive that is itself a temperature, pressure or power,
-the heat is the drive.
+They work on the drive squared: in the steady-state voltage squared ``q = Vs^2 = (d1/d2) (T - T0)``
+Eq. 1 reads ``dq/dt = d1 (V^2 - q)``. For a drive that is itself a temperature, pressure or power, q
+is the drive.
 
 They act in the order of this file: the heat transfer divides what comes in, the lags follow, and
 what the air adds comes last, because it changes slowly and the wire is in balance with it.
@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Parameter
+from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.stages import DriveEffect
 from hysteresis_ros.kernels.lag import lag
 
@@ -25,7 +25,7 @@ FASTEST = 1e12
 
 
 class ThermalEffect(DriveEffect):
-    """An effect on the heat that the muscle feels."""
+    """An effect on the drive squared that the muscle feels."""
 
     stage = 'thermal'
 
@@ -45,15 +45,15 @@ class Airflow(ThermalEffect):
                   log=True),)
 
     @property
-    def exchange(self):
+    def exchange(self) -> float:    # type: ignore[override]
         """Heat transfer over that of the bench, which the lags follow."""
         return self.beta
 
-    def forward(self, signal, inputs, surroundings):
-        """Divide the heat by the better cooling."""
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
+        """Divide the drive squared by the better cooling."""
         return signal / self.beta
 
-    def inverse(self, signal, inputs, surroundings):
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Multiply it again."""
         return signal * self.beta
 
@@ -68,72 +68,75 @@ class FirstOrderLag(ThermalEffect):
     needs_transients = True
     kinds = ('arm', 'bench')
 
-    memory = ('_heat', '_phase')
+    memory = ('_q', '_phase')
 
-    # How much faster than on the bench heat is exchanged: beta of `airflow`, set by the chain.
+    # The drive squared that the muscle feels, and the last phase known; None before a trial.
+    _q: float | None
+    _phase: float | None
+
+    # Without a chain the heat is exchanged as on the bench.
     speed = 1.0
 
     def rate(self, rising: bool) -> float:
-        """Return d1 [1/s] while the heat rises or falls, infinite without a lag."""
+        """Return d1 [1/s] while q rises or falls, infinite without a lag."""
         return self.speed / self.time_constant if self.time_constant > 0.0 else math.inf
 
-    def start(self):
-        """Forget the past: no heat."""
-        self._heat = None
+    def start(self) -> None:
+        """Forget the past: q is that of the cold state."""
+        self._q = None
         self._phase = None
 
-    def step(self, value, step, phase, surroundings):
-        """Advance Eq. 1 by `step` [s] towards `value`."""
-        if self._heat is None:
-            self._heat = self._cold(value, surroundings)
+    def step(self, value: float, dt: float, phase: float, surroundings: Surroundings) -> float:
+        """Advance Eq. 1 by `dt` [s] towards `value`."""
+        q = self._cold(value, surroundings) if self._q is None else self._q
         before = phase if self._phase is None else self._phase
         if math.isfinite(phase):
             self._phase = phase
-        self._heat = (value + (self._heat - value) * self._decay(value, step)
-                      + float(self._released(before, phase, surroundings)))
-        return self._heat
+        self._q = (value + (q - value) * self._decay(value > q, dt)
+                   + float(self._released(before, phase, surroundings)))
+        return self._q
 
     @staticmethod
-    def _cold(value, surroundings):
-        """Return the heat before a trial: none, or the first one where that is a temperature."""
+    def _cold(value: float, surroundings: Surroundings) -> float:
+        """Return q before a trial: 0, or the first one where that is a temperature."""
         return value if surroundings.drive == 'temperature' else 0.0
 
-    def _released(self, before, phase, surroundings):
-        """Return the heat that changing from the phase `before` gives off."""
+    def _released(self, before: Values, phase: Values, surroundings: Surroundings) -> Values:
+        """Return what changing from the phase `before` adds to q."""
         return 0.0 * np.nan_to_num(phase)
 
-    def forward(self, signal, inputs, surroundings):
+    def forward(self, signal: np.ndarray, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Do what `step` does for a whole trial."""
         self.start()
-        steps, phases = (np.ascontiguousarray(np.broadcast_to(column, np.shape(signal)), float)
-                         for column in (inputs.step, inputs.phase))
+        times, phases = (np.ascontiguousarray(np.broadcast_to(column, np.shape(signal)), float)
+                         for column in (inputs.dt, inputs.phase))
         released = self._released(np.concatenate((phases[:1], phases[:-1])), phases, surroundings)
-        heats = lag(np.ascontiguousarray(signal, float), steps,
-                    *(min(self.rate(rising), FASTEST) for rising in (True, False)), released,
-                    float(self._cold(signal[0], surroundings)))
-        self._heat, self._phase = float(heats[-1]), float(phases[-1])
-        return heats
+        up, down = (min(self.rate(rising), FASTEST) for rising in (True, False))
+        course = lag(np.ascontiguousarray(signal, float), times, up, down, released,
+                     float(self._cold(signal[0], surroundings)))
+        self._q, self._phase = float(course[-1]), float(phases[-1])
+        return course
 
-    def inverse(self, signal, inputs, surroundings):
-        """Return the input that brings the heat to `signal` in ``inputs.step`` seconds."""
-        if self._heat is None or not 0.0 < inputs.step < math.inf:
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
+        """Return the input that brings q to `signal` in ``inputs.dt`` seconds."""
+        if self._q is None or not 0.0 < inputs.dt < math.inf:
             return signal
-        decay = self._decay(signal, inputs.step)
-        return signal + (signal - self._heat) * decay / max(1.0 - decay, 1e-3)
+        decay = self._decay(signal > self._q, inputs.dt)
+        return signal + (signal - self._q) * decay / max(1.0 - decay, 1e-3)
 
-    def _decay(self, value, step):
-        """Return the share of the distance to `value` that is left after `step` [s]."""
-        rate = self.rate(value > self._heat)
+    def _decay(self, rising: bool, dt: float) -> float:
+        """Return the share of the distance to the input that remains after `dt` [s]."""
+        rate = self.rate(rising)
         if rate == math.inf:
             return 0.0
-        return math.exp(-rate * step)
+        return math.exp(-rate * dt)
 
 
 class ThermalLag(FirstOrderLag):
     """The wire takes time to heat and to cool."""
 
     id = 'thermal_lag'
-    sentence = 'The wire needs time to warm up and to cool down: the voltage is ahead of the heat.'
+    sentence = 'The wire needs time to warm up and to cool down: it lags behind the voltage.'
     equation = 'd(Vs^2)/dt = d1 (V^2 - Vs^2), time constant 1/d1'
     source = 'Eq. 1 of the paper (time constant about 5 s)'
     shows_in = 'time since a step, dV/dt'
@@ -161,7 +164,7 @@ class HeatingCoolingAsymmetry(FirstOrderLag):
         Parameter('ratio', '1', 'rate of heating over rate of cooling', 0.5, 2.0, 1.0, (0.7, 1.4),
                   log=True),)
 
-    def rate(self, rising):
+    def rate(self, rising: bool) -> float:
         """Return d1 [1/s] by direction."""
         return super().rate(rising) * (self.ratio if rising else 1.0)
 
@@ -184,9 +187,9 @@ class LatentHeat(FirstOrderLag):
         Parameter('latent', '1', 'h: latent heat over the heat stored at full drive', 0.05, 1.0,
                   0.0, (0.2, 0.5), log=True),)
 
-    def _released(self, before, phase, surroundings):
-        """Return it; nothing where the phase is not known."""
-        return np.nan_to_num(self.latent * surroundings.heat * (phase - before))
+    def _released(self, before: Values, phase: Values, surroundings: Surroundings) -> Values:
+        """Return the latent heat in units of q; nothing where the phase is not known."""
+        return np.nan_to_num(self.latent * surroundings.full_drive_squared * (phase - before))
 
 
 class AmbientTemperature(ThermalEffect):
@@ -201,17 +204,17 @@ class AmbientTemperature(ThermalEffect):
     confused_with = ('ambient_drift',)
     needs_column = 'ambient_temperature'
     parameters = (
-        Parameter('gain', 'V^2/K', 'd1/d2: heat that one kelvin stands for', 0.02, 2.0, 0.0,
-                  (0.2, 0.6), log=True),
+        Parameter('gain', 'V^2/K', 'd1/d2: drive squared that one kelvin stands for', 0.02, 2.0,
+                  0.0, (0.2, 0.6), log=True),
         Parameter('reference', 'degC', 'ambient temperature T0 of the bench', 5.0, 40.0, 25.0,
                   (23.0,)),)
 
-    def forward(self, signal, inputs, surroundings):
-        """Add the heat of the warmer or colder air; nothing where it was not recorded."""
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
+        """Add what warmer or colder air stands for; nothing where it was not recorded."""
         warmer = np.where(np.isfinite(inputs.ambient), inputs.ambient - self.reference, 0.0)
         return signal + self.gain * warmer
 
-    def inverse(self, signal, inputs, surroundings):
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Drive less in warm air."""
         if not math.isfinite(inputs.ambient):
             return signal
@@ -230,16 +233,16 @@ class AmbientDrift(ThermalEffect):
     confused_with = ('fatigue', 'creep')
     invertible = False
     parameters = (
-        Parameter('offset', 'V^2', 'heat of the air at the start against the bench', 0.0, 20.0,
+        Parameter('offset', 'V^2', 'what the air at the start adds against the bench', 0.0, 20.0,
                   0.0, (0.0,), both_signs=True),
-        Parameter('rate', 'V^2/10 min', 'change of that heat', 0.05, 20.0, 0.0, (-1.0, 1.0),
+        Parameter('rate', 'V^2/10 min', 'change of that', 0.05, 20.0, 0.0, (-1.0, 1.0),
                   both_signs=True),
         Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.0, 20.0, 0.0, (0.0,),
                   both_signs=True),)
 
     CLOCK_UNIT = 600.0
 
-    def forward(self, signal, inputs, surroundings):
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Add a slow function of the time since the recording began."""
         t = inputs.clock / self.CLOCK_UNIT
         return signal + self.offset + self.rate * t + self.curvature * t * t

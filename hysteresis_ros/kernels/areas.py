@@ -8,7 +8,7 @@ from .jit import jit
 
 
 @jit
-def signed_areas(nodes, inputs):
+def signed_areas(nodes: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """
     Return the signed areas s_ij(n) of Eq. 6 after each input, from the cold state.
 
@@ -62,7 +62,7 @@ def signed_areas(nodes, inputs):
 
 
 @jit
-def branches(inputs, lower):
+def branches(inputs: np.ndarray, lower: float) -> tuple[np.ndarray, np.ndarray]:
     """
     Find the corner of the staircase that the branch of each input starts from.
 
@@ -109,7 +109,7 @@ def branches(inputs, lower):
 
 
 @jit
-def signed_lengths(nodes, inputs):
+def signed_lengths(nodes: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """
     Return the length of each interval below each input less its length above.
 

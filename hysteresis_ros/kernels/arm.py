@@ -26,7 +26,7 @@ LINE = 4
 INSIDE, SCALE, STRETCH = range(3)
 
 # Entries of `State.motion`: angle [rad], NaN before the first sample; velocity and acceleration;
-# duration, angle and velocity of the step before, the duration NaN where there was none; x; whether
+# dt, angle and velocity of the sample before, that dt NaN where there was none; x; whether
 # the arm rings; its largest moment of inertia of late over the largest moment at rest; factors on
 # the first steps of searches; where on the grid each line was looked up last.
 (ANGLE, VELOCITY, ACCELERATION, BEFORE_DT, BEFORE_ANGLE, BEFORE_VELOCITY, X, RINGING,
@@ -44,10 +44,10 @@ class Arm(NamedTuple):
     `grid` (n, 8 or 16) and `loads` (m, 3) have the columns above; `spacing` [N] is that of the
     loads. `base` [m] is the least output of H2; `coulomb` [N m], `viscous` [N m s/rad] and
     `inertia` [kg m^2] resist motion; `tolerance` [N] is the load that may be missing at rest.
-    `longest` [s] is the longest step of an arm that rings, `heaviest` [N m] the largest moment at
+    `longest` [s] is the longest dt of an arm that rings, `heaviest` [N m] the largest moment at
     rest, and `calm` a step of x that does not make it ring. `rigid` says whether the demand does
     not depend on dry friction, `strained` whether an offset counts by the load, `dynamic` whether
-    velocity or acceleration count, and `swings` whether each step solves the equation of motion.
+    velocity or acceleration count, and `swings` whether each dt solves the equation of motion.
     """
 
     wires: Wires
@@ -77,7 +77,8 @@ class State(NamedTuple):
 
 
 @lean
-def place(arm, motion, line, demand, offset):
+def place(arm: Arm, motion: np.ndarray, line: int, demand: float, offset: float
+          ) -> tuple[int, float]:
     """Return the place at which the transformation gives `demand`, with an offset [m]."""
     last = len(arm.grid) - 1
     column, strain = DEMAND + LINE * line, STRAIN + LINE * line
@@ -105,7 +106,7 @@ def place(arm, motion, line, demand, offset):
 
 
 @lean
-def demand_at(arm, line, k, share, offset):
+def demand_at(arm: Arm, line: int, k: int, share: float, offset: float) -> float:
     """Return what the transformation has to give at a place: `place` inverted."""
     demand = grid.between(arm.grid, DEMAND + LINE * line, k, share)
     if arm.strained:
@@ -114,16 +115,16 @@ def demand_at(arm, line, k, share, offset):
 
 
 @lean
-def present(arm, motion):
+def present(arm: Arm, motion: np.ndarray) -> tuple[int, float]:
     """Return the place of the present angle."""
     angle = motion[ANGLE]
-    step = arm.grid[1, THETA] - arm.grid[0, THETA]
-    k = grid.interval(arm.grid, THETA, angle, int((angle - arm.grid[0, THETA]) / step) + 1)
+    spacing = arm.grid[1, THETA] - arm.grid[0, THETA]
+    k = grid.interval(arm.grid, THETA, angle, int((angle - arm.grid[0, THETA]) / spacing) + 1)
     return k, (angle - arm.grid[k - 1, THETA]) / (arm.grid[k, THETA] - arm.grid[k - 1, THETA])
 
 
 @lean
-def moved(motion, theta, dt):
+def moved(motion: np.ndarray, theta: float, dt: float) -> tuple[float, float]:
     """Return velocity and acceleration where the arm gets to `theta` within `dt`."""
     angle, velocity = motion[ANGLE], motion[VELOCITY]
     if motion[RINGING] != 0.0:
@@ -131,7 +132,7 @@ def moved(motion, theta, dt):
         acceleration = 12.0 * way / dt ** 2 - 5.0 * motion[ACCELERATION]
         return velocity + 0.5 * dt * (motion[ACCELERATION] + acceleration), acceleration
     if motion[BEFORE_DT] == dt:
-        # Two steps alike: of second order.
+        # Twice the same dt: of second order.
         speed = (1.5 * theta - 2.0 * angle + 0.5 * motion[BEFORE_ANGLE]) / dt
         return speed, (1.5 * speed - 2.0 * velocity + 0.5 * motion[BEFORE_VELOCITY]) / dt
     speed = (theta - angle) / dt
@@ -139,7 +140,7 @@ def moved(motion, theta, dt):
 
 
 @lean
-def keep_motion(arm, motion, angle, dt):
+def keep_motion(arm: Arm, motion: np.ndarray, angle: float, dt: float) -> None:
     """Note the velocity with which the arm gets to `angle`; none at an end or at rest."""
     if dt == 0.0 or angle == arm.grid[0, THETA] or angle == arm.grid[-1, THETA]:
         motion[VELOCITY] = motion[ACCELERATION] = 0.0
@@ -152,7 +153,7 @@ def keep_motion(arm, motion, angle, dt):
 
 
 @lean
-def required(arm, motion, line, k, share, dt):
+def required(arm: Arm, motion: np.ndarray, line: int, k: int, share: float, dt: float) -> float:
     """Return the load that the arm asks for at a place, reached within `dt`."""
     load = grid.between(arm.grid, LOAD + LINE * line, k, share)
     if dt != 0.0:

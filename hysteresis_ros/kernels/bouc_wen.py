@@ -3,8 +3,8 @@
 """
 The hidden state of the normalised Bouc-Wen operator, solved exactly between reversals.
 
-While the input u rises the state w follows dw/du = rho pace(w), pace = 1 - w^n for w >= 0 and
-1 + c |w|^n for w < 0 with c = 2 sigma - 1. So rho (u - u0) = G(w) - G(w0) with
+While the input u rises the state w follows dw/du = rho pace(w), with c = 2 sigma - 1 and pace
+``1 - w^n`` for w >= 0, ``1 + c |w|^n`` for w < 0. So ``rho (u - u0) = G(w) - G(w0)`` with ::
 
     G(w) = w F(1, b; 1 + b; w^n)  or, for w < 0,  w F(1, b; 1 + b; -c |w|^n),   b = 1 / n
 
@@ -25,7 +25,7 @@ MOST_TERMS, MOST_ITERATIONS = 400, 100
 
 
 @jit
-def pace(w, gap, curl, exponent):
+def pace(w: float, gap: float, curl: float, exponent: float) -> float:
     """Return dw/du over the rate while the input rises; `gap` is 1 - w."""
     if w < 0.0:
         return 1.0 + curl * (-w) ** exponent
@@ -35,7 +35,7 @@ def pace(w, gap, curl, exponent):
 
 
 @jit
-def _beside_one(away, b, pole):
+def _near_one(away: float, b: float, pole: float) -> float:
     """Return F(1, b; 1 + b; 1 - away), 0 < away <= 1/2 (Abramowitz and Stegun, 15.3.10)."""
     logarithm, total, factor, power = math.log(away), 0.0, 1.0, 1.0
     for k in range(MOST_TERMS):
@@ -50,7 +50,7 @@ def _beside_one(away, b, pole):
 
 
 @jit
-def _beside_zero(z, b):
+def _near_zero(z: float, b: float) -> float:
     """Return F(1, b; 1 + b; z) for 0 <= z <= 1/2, by its power series."""
     total, power = 0.0, 1.0
     for k in range(MOST_TERMS):
@@ -63,7 +63,7 @@ def _beside_zero(z, b):
 
 
 @jit
-def _negative(x, b):
+def _negative(x: float, b: float) -> float:
     """Return F(1, b; 1 + b; -x) for x >= 0, by Gauss's continued fraction."""
     if x == 0.0:
         return 1.0
@@ -79,17 +79,17 @@ def _negative(x, b):
 
 
 @jit
-def travel(w, gap, curl, exponent, pole):
+def travel(w: float, gap: float, curl: float, exponent: float, pole: float) -> float:
     """Return G(w), the rate times the input from w = 0 to w while rising; gap = 1 - w > 0."""
     b = 1.0 / exponent
     if w < 0.0:
         return w * _negative(curl * (-w) ** exponent, b)
     away = pace(w, gap, curl, exponent)
-    return w * (_beside_one(away, b, pole) if away < 0.5 else _beside_zero(1.0 - away, b))
+    return w * (_near_one(away, b, pole) if away < 0.5 else _near_zero(1.0 - away, b))
 
 
 @jit
-def reached(distance, curl, exponent, pole):
+def reached(distance: float, curl: float, exponent: float, pole: float) -> float:
     """
     Return w with G(w) = distance.
 
@@ -116,7 +116,7 @@ def reached(distance, curl, exponent, pole):
 
 
 @jit
-def moved(w, change, curl, exponent, pole):
+def moved(w: float, change: float, curl: float, exponent: float, pole: float) -> float:
     """Return w after the input moved by `change`, in units of 1 / rate."""
     side = 1.0 if change > 0.0 else -1.0
     v = side * w
@@ -127,7 +127,8 @@ def moved(w, change, curl, exponent, pole):
 
 
 @jit
-def follow(inputs, u, w, rate, curl, exponent, pole):
+def follow(inputs: np.ndarray, u: float, w: float, rate: float, curl: float, exponent: float,
+           pole: float) -> np.ndarray:
     """
     Return the course of the hidden state.
 

@@ -43,7 +43,8 @@ class Wires(NamedTuple):
 
 
 @lean
-def inputs_for(wires, memories, output, mean, inputs):
+def inputs_for(wires: Wires, memories: np.ndarray, output: float, mean: float, inputs: np.ndarray
+               ) -> None:
     """Put each muscle's input ``u_i = F_i - x`` for an output under a mean one into `inputs`."""
     stretched = output + wires.inside * (mean - wires.middle)
     for i in range(len(wires.offsets)):
@@ -53,7 +54,7 @@ def inputs_for(wires, memories, output, mean, inputs):
 
 
 @lean
-def mean_load(inputs, x):
+def mean_load(inputs: np.ndarray, x: float) -> float:
     """Return the mean load for each muscle's input; a wire cannot push."""
     total = 0.0
     for i in range(len(inputs)):
@@ -62,7 +63,7 @@ def mean_load(inputs, x):
 
 
 @lean
-def mean_input(wires, memories):
+def mean_input(wires: Wires, memories: np.ndarray) -> float:
     """Return the mean of the inputs committed last."""
     total = 0.0
     for i in range(len(wires.offsets)):
@@ -71,7 +72,7 @@ def mean_input(wires, memories):
 
 
 @lean
-def mean_output(wires, memories):
+def mean_output(wires: Wires, memories: np.ndarray) -> float:
     """Return what the transformation gives [m], the mean of the muscles."""
     total = 0.0
     for i in range(len(wires.offsets)):
@@ -81,20 +82,21 @@ def mean_output(wires, memories):
 
 
 @lean
-def commit(wires, memories, inputs):
+def commit(wires: Wires, memories: np.ndarray, inputs: np.ndarray) -> None:
     """Commit each muscle's input."""
     for i in range(len(wires.offsets)):
         step(wires.table, memories[i], inputs[i])
 
 
 @lean
-def keep_gain(search, at, moved, scale, here):
+def keep_gain(search: np.ndarray, at: int, moved: float, scale: float, here: float) -> None:
     """Remember how far the root was against what the scale said."""
     search[at + GAIN] = min(max(abs(moved / (scale * here)), 0.01), 100.0)
 
 
 @lean
-def drive(wires, memories, search, output, load, inputs):
+def drive(wires: Wires, memories: np.ndarray, search: np.ndarray, output: float, load: float,
+          inputs: np.ndarray) -> float:
     """Return the x [N] under which the muscles give `output` [m] and bear `load` [N] each."""
     near = load - mean_input(wires, memories)
     inputs_for(wires, memories, output, load - near, inputs)
@@ -110,7 +112,8 @@ def drive(wires, memories, search, output, load, inputs):
 
 
 @lean
-def respond(wires, memories, search, x, load, low, high, near, inputs):
+def respond(wires: Wires, memories: np.ndarray, search: np.ndarray, x: float, load: float,
+            low: float, high: float, near: float, inputs: np.ndarray) -> float:
     """
     Return the output [m] that the muscles give under x and a load, and put their inputs in place.
 

@@ -7,6 +7,7 @@ import contextlib
 import logging
 import os
 import threading
+from typing import Any, TypeVar
 
 import numba
 from numba.core.caching import FunctionCache
@@ -17,13 +18,15 @@ from hysteresis_ros.kernels.cache_folder import cache_folder
 try:
     import fcntl
 except ImportError:     # no POSIX: processes that compile at once are on their own
-    fcntl = None
+    fcntl = None        # type: ignore[assignment]
+
+Function = TypeVar('Function', bound=Callable)
 
 _DECORATING = threading.Lock()
 _REPORTED: set[str] = set()
 
 
-def compile_and_keep(function: Callable) -> Callable:
+def compile_and_keep(function: Function) -> Function:
     """Return the compiled function, whose machine code is kept in the cache's folder."""
     compiled = numba.njit(nogil=True, error_model='numpy')(function)
     # With NUMBA_DISABLE_JIT=1 numba gives the function itself back.
@@ -44,7 +47,7 @@ class KernelCache(FunctionCache):
     cannot be read is compiled anew.
     """
 
-    def load_overload(self, sig, target_context):
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled function for a signature, or None if it is not there."""
         try:
             with self._locked(exclusive=False):
@@ -54,7 +57,7 @@ class KernelCache(FunctionCache):
             self._forget()
             return None
 
-    def save_overload(self, sig, data):
+    def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the compiled function for a signature."""
         try:
             with self._locked(exclusive=True):

@@ -10,13 +10,13 @@ from .jit import jit
 
 
 @jit
-def relax(targets, steps, times, modes):
+def relax(targets: np.ndarray, dt: np.ndarray, times: np.ndarray, modes: np.ndarray) -> np.ndarray:
     """
     Return the sum of relaxations towards a target that changes.
 
     Parameters
     ----------
-    targets, steps : ndarray, shape (rows,)
+    targets, dt : ndarray, shape (rows,)
         Target, NaN where nothing relaxes, and time since the row before [s].
     times : ndarray, shape (modes,)
         Time constant of each relaxation [s].
@@ -33,16 +33,16 @@ def relax(targets, steps, times, modes):
         total[n] = 0.0
         for k in range(len(modes)):
             if not math.isnan(targets[n]):
-                decay = math.exp(-steps[n] / times[k])
+                decay = math.exp(-dt[n] / times[k])
                 modes[k] = targets[n] + (modes[k] - targets[n]) * decay
             total[n] += modes[k]
     return total
 
 
 @jit
-def fade(strain, turned, clock):
+def fade(strain: np.ndarray, turned: np.ndarray, clock: np.ndarray) -> np.ndarray:
     """
-    Return what earlier runs of the drive have left.
+    Return the strain of earlier runs of the drive that has not faded yet.
 
     Parameters
     ----------
@@ -51,18 +51,18 @@ def fade(strain, turned, clock):
     turned : ndarray of bool, shape (rows,)
         Whether a run begins.
     clock : ndarray, shape (rows,)
-        Time over the time in which what is left falls by a factor e.
+        Time over the time in which it falls by a factor e.
 
     Returns
     -------
     ndarray, shape (rows,)
 
     """
-    left = np.zeros(len(strain))
+    course = np.zeros(len(strain))
     carried, begun = 0.0, 0
     for n in range(len(strain)):
         if turned[n] and n > 0:
-            carried = left[n - 1] * math.exp(clock[n - 1] - clock[n]) + strain[n - 1]
+            carried = course[n - 1] * math.exp(clock[n - 1] - clock[n]) + strain[n - 1]
             begun = n
-        left[n] = carried * math.exp(clock[begun] - clock[n])
-    return left
+        course[n] = carried * math.exp(clock[begun] - clock[n])
+    return course

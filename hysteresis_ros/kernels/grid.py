@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Places on a grid: an interval k, between entries k - 1 and k, and a share of it."""
 
+import numpy as np
+
 from .lean import lean
 
 
 @lean
-def interval(grid, column, value, near):
+def interval(grid: np.ndarray, column: int, value: float, near: int) -> int:
     """
     Return the interval of an ascending column that a value lies in; the outer ones have no end.
 
@@ -34,6 +36,6 @@ def interval(grid, column, value, near):
 
 
 @lean
-def between(grid, column, k, share):
+def between(grid: np.ndarray, column: int, k: int, share: float) -> float:
     """Return a column's value at a place."""
     return grid[k - 1, column] + share * (grid[k, column] - grid[k - 1, column])

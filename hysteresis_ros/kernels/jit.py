@@ -9,6 +9,9 @@ Python.
 
 from collections.abc import Callable
 import logging
+from typing import TypeVar
+
+Function = TypeVar('Function', bound=Callable)
 
 try:
     from hysteresis_ros.kernels.compiler import compile_and_keep
@@ -16,12 +19,16 @@ except ModuleNotFoundError as error:
     # Not every system has a package of numba. All works without, but for the time that it takes.
     if error.name != 'numba':
         raise
-    compile_and_keep = None
+
+    def compile_and_keep(function: Function) -> Function:
+        """Return the function as it is."""
+        return function
+
     logging.getLogger(__name__).warning(
         'numba is not installed: simulations take 20 to 50 times as long; pip install numba')
 
 
-def jit(function: Callable) -> Callable:
+def jit(function: Function) -> Function:
     """
     Compile a function for each combination of types that it is called with, and keep the result.
 
@@ -39,4 +46,4 @@ def jit(function: Callable) -> Callable:
     callable
         The compiled function, or `function` itself with ``NUMBA_DISABLE_JIT=1`` or without numba.
     """
-    return compile_and_keep(function) if compile_and_keep else function
+    return compile_and_keep(function)

@@ -10,19 +10,20 @@ from .jit import jit
 
 
 @jit
-def lag(values, steps, rising, falling, released, heat):
+def lag(values: np.ndarray, dt: np.ndarray, rising: float, falling: float, released: np.ndarray,
+        q: float) -> np.ndarray:
     """
     Return the course of ``dq/dt = d1 (v - q)`` under inputs held from one row to the next.
 
     Parameters
     ----------
-    values, steps : ndarray, shape (rows,)
+    values, dt : ndarray, shape (rows,)
         Input v, and time since the row before [s].
     rising, falling : float
         Rate d1 [1/s] while q rises and while it falls.
     released : ndarray, shape (rows,)
         What is added to q in each row.
-    heat : float
+    q : float
         q before the first row.
 
     Returns
@@ -32,7 +33,7 @@ def lag(values, steps, rising, falling, released, heat):
     """
     course = np.empty(len(values))
     for n in range(len(values)):
-        rate = rising if values[n] > heat else falling
-        heat = values[n] + (heat - values[n]) * math.exp(-rate * steps[n]) + released[n]
-        course[n] = heat
+        rate = rising if values[n] > q else falling
+        q = values[n] + (q - values[n]) * math.exp(-rate * dt[n]) + released[n]
+        course[n] = q
     return course

@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How kernels are compiled that allocate nothing: without counting references."""
 
-from collections.abc import Callable
-
-from .jit import jit
+from .jit import Function, jit
 
 
-def lean(function: Callable) -> Callable:
+def lean(function: Function) -> Function:
     """
     Return a kernel compiled by `jit` that makes no arrays.
 

@@ -4,6 +4,8 @@
 
 import math
 
+import numpy as np
+
 from .layout import (
     DIRECTION, HIGH, INPUT, LOW, LOWER, OUTPUT, SATURATED, TABLE, TOLERANCE, UPPER)
 from .lean import lean
@@ -12,13 +14,13 @@ SLOPE, INTERCEPT = TABLE, TABLE + 1
 
 
 @lean
-def at(table, u):
+def at(table: np.ndarray, u: float) -> float:
     """Return the output at an input inside the range."""
     return table[INTERCEPT] + table[SLOPE] * u
 
 
 @lean
-def reset(table, memory):
+def reset(table: np.ndarray, memory: np.ndarray) -> None:
     """Go back to the lower end of the range."""
     memory[INPUT] = table[LOWER]
     memory[OUTPUT] = at(table, table[LOWER])
@@ -26,7 +28,7 @@ def reset(table, memory):
 
 
 @lean
-def step(table, memory, u):
+def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Commit an input and return the output."""
     memory[SATURATED] = 0.0 if table[LOWER] <= u <= table[UPPER] else 1.0
     if not math.isnan(u):
@@ -39,7 +41,7 @@ def step(table, memory, u):
 
 
 @lean
-def peek(table, memory, u):
+def peek(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Return the output that `step` would give, and commit nothing."""
     if math.isnan(u):
         return memory[OUTPUT]
@@ -47,7 +49,7 @@ def peek(table, memory, u):
 
 
 @lean
-def solve(table, memory, y):
+def solve(table: np.ndarray, memory: np.ndarray, y: float) -> tuple[float, float, bool]:
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
     low, high, tolerance = table[LOW], table[HIGH], table[TOLERANCE]
     saturated = not low - tolerance <= y <= high + tolerance

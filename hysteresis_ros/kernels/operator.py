@@ -11,7 +11,7 @@ from .lean import lean
 
 
 @lean
-def reset(table, memory):
+def reset(table: np.ndarray, memory: np.ndarray) -> None:
     """Forget the history."""
     if table[KIND] == PREISACH:
         preisach.reset(table, memory)
@@ -22,7 +22,7 @@ def reset(table, memory):
 
 
 @lean
-def step(table, memory, u):
+def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Commit an input and return the output."""
     if table[KIND] == PREISACH:
         return preisach.step(table, memory, u)
@@ -32,7 +32,7 @@ def step(table, memory, u):
 
 
 @lean
-def peek(table, memory, u):
+def peek(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Return the output that `step` would give, and commit nothing."""
     if table[KIND] == PREISACH:
         return preisach.peek(table, memory, u)
@@ -42,7 +42,7 @@ def peek(table, memory, u):
 
 
 @lean
-def solve(table, memory, y):
+def solve(table: np.ndarray, memory: np.ndarray, y: float) -> tuple[float, float, bool]:
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
     if table[KIND] == PREISACH:
         return preisach.solve(table, memory, y)
@@ -52,7 +52,7 @@ def solve(table, memory, y):
 
 
 @jit
-def simulate(table, memory, inputs):
+def simulate(table: np.ndarray, memory: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """Commit a sequence of inputs, shape (n,), and return the outputs, shape (n,)."""
     outputs = np.empty(len(inputs))
     if table[KIND] == PREISACH:
@@ -65,12 +65,12 @@ def simulate(table, memory, inputs):
 
 
 @lean
-def last_input(table, memory):
+def last_input(table: np.ndarray, memory: np.ndarray) -> float:
     """Return the input committed last."""
     return memory[INPUT]
 
 
 @lean
-def last_output(table, memory):
+def last_output(table: np.ndarray, memory: np.ndarray) -> float:
     """Return the output for it."""
     return memory[OUTPUT]

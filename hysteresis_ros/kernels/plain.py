@@ -6,7 +6,7 @@ from collections.abc import Callable
 import types
 
 # What kernels ask an operator for; its class answers in the place of the operator's memory.
-_ANSWERS = {
+_ANSWERS: dict[str, Callable] = {
     'reset': lambda table, operator: operator.reset(),
     'step': lambda table, operator, u: operator.step(u),
     'peek': lambda table, operator, u: operator.peek(u),
@@ -38,7 +38,8 @@ class Plain:
         key = f'{module}.{name}'
         if key not in self._functions:
             names = dict(function.__globals__)
-            plain = types.FunctionType(function.__code__, names, name, function.__defaults__)
+            plain: Callable = types.FunctionType(
+                function.__code__, names, name, function.__defaults__)
             self._functions[key] = plain
             for used in function.__code__.co_names:
                 if used in names:

@@ -22,7 +22,7 @@ RADII = TABLE + 3
 
 
 @lean
-def moved(place, u, radius):
+def moved(place: float, u: float, radius: float) -> float:
     """Return the place of a play after a movement of its input."""
     if place < u - radius:
         return u - radius
@@ -30,7 +30,7 @@ def moved(place, u, radius):
 
 
 @jit
-def follow(inputs, radius, place):
+def follow(inputs: np.ndarray, radius: float, place: float) -> np.ndarray:
     """
     Return the course of a play.
 
@@ -55,7 +55,7 @@ def follow(inputs, radius, place):
 
 
 @lean
-def total(table, memory, u):
+def total(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Return the weighted sum of the plays after a movement to an input inside the range."""
     plays = int(table[PLAYS])
     x = 0.0
@@ -65,7 +65,7 @@ def total(table, memory, u):
 
 
 @lean
-def bend(table, x):
+def bend(table: np.ndarray, x: float) -> float:
     """Return the output for a weighted sum."""
     bends = int(table[BENDS])
     curve = RADII + 2 * int(table[PLAYS])
@@ -78,7 +78,7 @@ def bend(table, x):
 
 
 @lean
-def unbend(table, y):
+def unbend(table: np.ndarray, y: float) -> float:
     """Return the weighted sum that gives an output."""
     bends = int(table[BENDS])
     curve = RADII + 2 * int(table[PLAYS])
@@ -92,7 +92,7 @@ def unbend(table, y):
 
 
 @lean
-def reset(table, memory):
+def reset(table: np.ndarray, memory: np.ndarray) -> None:
     """Forget the history: the input came down to the lower end from far above."""
     for k in range(int(table[PLAYS])):
         memory[MEMORY + k] = table[LOWER] + table[RADII + k]
@@ -102,7 +102,7 @@ def reset(table, memory):
 
 
 @lean
-def step(table, memory, u):
+def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Commit an input and return the output."""
     memory[SATURATED] = 0.0 if table[LOWER] <= u <= table[UPPER] else 1.0
     if not math.isnan(u):
@@ -117,7 +117,7 @@ def step(table, memory, u):
 
 
 @lean
-def peek(table, memory, u):
+def peek(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Return the output that `step` would give, and commit nothing."""
     if math.isnan(u):
         return memory[OUTPUT]
@@ -125,7 +125,7 @@ def peek(table, memory, u):
 
 
 @lean
-def _starts(table, memory, k, rising):
+def _starts(table: np.ndarray, memory: np.ndarray, k: int, rising: bool) -> float:
     """
     Return the input at which a play begins to move, the end of the range after the last one.
 
@@ -140,7 +140,7 @@ def _starts(table, memory, k, rising):
 
 
 @lean
-def solve(table, memory, y):
+def solve(table: np.ndarray, memory: np.ndarray, y: float) -> tuple[float, float, bool]:
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
     low, high, tolerance = table[LOW], table[HIGH], table[TOLERANCE]
     saturated = not low - tolerance <= y <= high + tolerance

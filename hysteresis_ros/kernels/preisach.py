@@ -18,6 +18,8 @@ and room to thin them out.
 
 import math
 
+import numpy as np
+
 from .layout import (
     DIRECTION, INPUT, LOWER, MEMORY, OUTPUT, SATURATED, SIGN, TABLE, TOLERANCE, UPPER)
 from .lean import lean
@@ -37,13 +39,13 @@ def memory_size(corners: int) -> int:
 
 
 @lean
-def capacity(memory):
+def capacity(memory: np.ndarray) -> int:
     """Return how many corners a memory of `memory_size` has room for; one more for a moment."""
     return (len(memory) - CORNERS) * 4 // 9 - 2
 
 
 @lean
-def reset(table, memory):
+def reset(table: np.ndarray, memory: np.ndarray) -> None:
     """Forget the history: all relays down, input at the lower end."""
     # As if the input had come down from saturation.
     memory[CORNERS], memory[CORNERS + 1] = table[UPPER], table[SPAN]
@@ -54,7 +56,7 @@ def reset(table, memory):
 
 
 @lean
-def _commit(table, memory, u, level):
+def _commit(table: np.ndarray, memory: np.ndarray, u: float, level: float) -> None:
     memory[INPUT] = u
     memory[LEVEL] = level
     memory[OUTPUT] = table[BASE] + table[SIGN] * level
@@ -62,7 +64,7 @@ def _commit(table, memory, u, level):
 
 
 @lean
-def interval(table, u):
+def interval(table: np.ndarray, u: float) -> int:
     """Return the interval of the grid that an input lies in; a node belongs to the one above."""
     levels = int(table[LEVELS])
     k = int((u - table[LOWER]) * table[SCALE])
@@ -79,19 +81,19 @@ def interval(table, u):
 
 
 @lean
-def _halves(table):
+def _halves(table: np.ndarray) -> int:
     """Return the place of the half weights on the diagonal; the reversible ones follow."""
     return NODES + int(table[LEVELS]) + 1
 
 
 @lean
-def _cell(table, a, b):
+def _cell(table: np.ndarray, a: int, b: int) -> int:
     levels = int(table[LEVELS])
     return NODES + 1 + 3 * levels + 4 * (a * levels + b)
 
 
 @lean
-def everett(table, alpha, beta):
+def everett(table: np.ndarray, alpha: float, beta: float) -> float:
     """Return E at one point, first node <= beta <= alpha <= last node."""
     halves = _halves(table)
     a = interval(table, alpha)
@@ -107,7 +109,7 @@ def everett(table, alpha, beta):
 
 
 @lean
-def _root(rest, slope, bend, width):
+def _root(rest: float, slope: float, bend: float, width: float) -> float:
     """Return d in [0, width] with slope d + bend d^2 = rest; all arguments non-negative."""
     if rest <= 0.0:
         return 0.0
@@ -118,7 +120,8 @@ def _root(rest, slope, bend, width):
 
 
 @lean
-def find_alpha(table, target, beta, tolerance):
+def find_alpha(table: np.ndarray, target: float, beta: float, tolerance: float
+               ) -> tuple[float, float]:
     """
     Solve E(alpha, beta) = target for the smallest alpha.
 
@@ -173,7 +176,8 @@ def find_alpha(table, target, beta, tolerance):
 
 
 @lean
-def find_beta(table, target, alpha, tolerance):
+def find_beta(table: np.ndarray, target: float, alpha: float, tolerance: float
+              ) -> tuple[float, float]:
     """Solve E(alpha, beta) = target for the largest beta; see `find_alpha`."""
     if target <= tolerance:
         return alpha, 0.0
@@ -209,7 +213,7 @@ def find_beta(table, target, alpha, tolerance):
 
 
 @lean
-def beyond(entries, offset, depth, bound, rising):
+def beyond(entries: np.ndarray, offset: int, depth: int, bound: float, rising: bool) -> int:
     """
     Return how many corners survive a movement up (down) to a bound.
 
@@ -248,7 +252,7 @@ def beyond(entries, offset, depth, bound, rising):
 
 
 @lean
-def trace(table, memory, u):
+def trace(table: np.ndarray, memory: np.ndarray, u: float) -> tuple[float, int, bool]:
     """
     Follow the memory to an input strictly inside the range.
 
@@ -294,7 +298,7 @@ def trace(table, memory, u):
 
 
 @lean
-def step(table, memory, u):
+def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Commit an input and return the output; see `HysteresisOperator.step`."""
     if table[LOWER] < u < table[UPPER]:
         level, depth, turned = trace(table, memory, u)
@@ -319,7 +323,7 @@ def step(table, memory, u):
 
 
 @lean
-def peek(table, memory, u):
+def peek(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Return the output that `step` would give, and commit nothing."""
     if table[LOWER] < u < table[UPPER]:
         return table[BASE] + table[SIGN] * trace(table, memory, u)[0]
@@ -329,7 +333,7 @@ def peek(table, memory, u):
 
 
 @lean
-def solve(table, memory, y):
+def solve(table: np.ndarray, memory: np.ndarray, y: float) -> tuple[float, float, bool]:
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
     sign, base, tolerance = table[SIGN], table[BASE], table[TOLERANCE]
     target = sign * (y - base)
@@ -372,7 +376,7 @@ def solve(table, memory, y):
 
 
 @lean
-def recall(table, memory, u):
+def recall(table: np.ndarray, memory: np.ndarray, u: float) -> None:
     """Compute the levels of corners that were put into the memory, and commit an input on top."""
     memory[CORNERS], memory[CORNERS + 1] = table[UPPER], table[SPAN]
     memory[CORNERS + 2], memory[CORNERS + 3] = table[LOWER], 0.0
@@ -393,7 +397,7 @@ def recall(table, memory, u):
 
 
 @lean
-def thin(table, memory, depth):
+def thin(table: np.ndarray, memory: np.ndarray, depth: int) -> int:
     """
     Merge neighbouring steps of a staircase that has become too long.
 
@@ -450,7 +454,7 @@ def thin(table, memory, depth):
 
 
 @lean
-def _rectangle(table, memory, k):
+def _rectangle(table: np.ndarray, memory: np.ndarray, k: int) -> float:
     """Return the size by which steps are merged: that of the rectangle between two of them."""
     # Inside one cell the weight is uniform and its mean is exact: such steps come first.
     size = (memory[k] - memory[k + 4]) * (memory[k + 6] - memory[k + 2])
@@ -460,7 +464,7 @@ def _rectangle(table, memory, k):
 
 
 @lean
-def heap_sort(values, start, count):
+def heap_sort(values: np.ndarray, start: int, count: int) -> None:
     """Sort `count` values from a place on, in place: a kernel that steps must not allocate."""
     for parent in range(count // 2 - 1, -1, -1):
         _sift(values, start, parent, count)
@@ -470,7 +474,7 @@ def heap_sort(values, start, count):
 
 
 @lean
-def _sift(values, start, parent, end):
+def _sift(values: np.ndarray, start: int, parent: int, end: int) -> None:
     """Let a value sink to its place in a heap whose largest is on top."""
     value = values[start + parent]
     child = 2 * parent + 1

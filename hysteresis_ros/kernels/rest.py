@@ -12,14 +12,15 @@ import numpy as np
 
 from . import bundle, grid, root
 from .arm import (
-    ANGLE, BUNDLE_SEARCH, DEMAND, demand_at, LINE, LOAD, place, present, required, REST_GAIN,
-    REST_SEARCH)
+    ANGLE, Arm, BUNDLE_SEARCH, DEMAND, demand_at, LINE, LOAD, place, present, required, REST_GAIN,
+    REST_SEARCH, State)
 from .lean import lean
 from .operator import last_input, last_output, peek, solve, step
 
 
 @lean
-def settle(arm, state, line, x, offset, factor):
+def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: float
+           ) -> tuple[int, float]:
     """Commit the u next to the present one at which one muscle balances, and return the place."""
     table, memory, motion = arm.wires.table, state.memories[0], state.motion
     start = u = last_input(table, memory)
@@ -36,7 +37,8 @@ def settle(arm, state, line, x, offset, factor):
 
 
 @lean
-def _lacking(arm, state, line, u, x, offset, factor):
+def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: float, factor: float
+             ) -> float:
     """Return the load that the arm asks for beyond the one under which H2 has the input u."""
     output = peek(arm.wires.table, state.memories[0], u)
     k, share = place(arm, state.motion, line, factor * (output - arm.base), offset)
@@ -44,7 +46,8 @@ def _lacking(arm, state, line, u, x, offset, factor):
 
 
 @lean
-def settle_bundle(arm, state, line, x, offset, factor, dt):
+def settle_bundle(arm: Arm, state: State, line: int, x: float, offset: float, factor: float,
+                  dt: float) -> tuple[int, float]:
     """Commit what unequal muscles do, and return the place where they balance."""
     motion, last = state.motion, len(arm.grid) - 1
     near = float(last)
@@ -72,7 +75,8 @@ def settle_bundle(arm, state, line, x, offset, factor, dt):
 
 
 @lean
-def _lacking_bundle(arm, state, line, point, x, offset, factor, dt):
+def _lacking_bundle(arm: Arm, state: State, line: int, point: float, x: float, offset: float,
+                    factor: float, dt: float) -> tuple[int, float, float]:
     """Return the place at a point of the grid, and the load that is missing there."""
     k = min(int(point), len(arm.grid) - 2) + 1
     share = point - (k - 1)
@@ -83,7 +87,7 @@ def _lacking_bundle(arm, state, line, point, x, offset, factor, dt):
 
 
 @lean
-def direction(arm, state, x, offset, factor, dt):
+def direction(arm: Arm, state: State, x: float, offset: float, factor: float, dt: float) -> int:
     """Return in which direction the arm slides: 1 down, -1 up, 0 where friction holds it."""
     motion = state.motion
     k, share = present(arm, motion)
@@ -108,7 +112,8 @@ def direction(arm, state, x, offset, factor, dt):
 
 
 @lean
-def _lacking_held(arm, state, k, share, drag, x, offset, factor, dt):
+def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: float,
+                  offset: float, factor: float, dt: float) -> float:
     """Return the load that is missing where friction takes a part, -1 to 1, of what it can."""
     edge, part = 1 if drag > 0.0 else 2, abs(drag)
     demand = demand_at(arm, 0, k, share, offset)

@@ -17,6 +17,8 @@ stall at one end (the Illinois method), the fastest choice for a function withou
 
 import math
 
+import numpy as np
+
 from .lean import lean
 
 
@@ -30,7 +32,8 @@ MOST_ITERATIONS = 60
 
 
 @lean
-def begin(memory, at, start, here, step, low, high, tolerance):
+def begin(memory: np.ndarray, at: int, start: float, here: float, step: float, low: float,
+          high: float, tolerance: float) -> float:
     """
     Begin where the last root was and return the first place to evaluate.
 
@@ -59,7 +62,8 @@ def begin(memory, at, start, here, step, low, high, tolerance):
 
 
 @lean
-def between(memory, at, near, here, far, there, tolerance):
+def between(memory: np.ndarray, at: int, near: float, here: float, far: float, there: float,
+            tolerance: float) -> float:
     """Begin between two points on both sides of the root; evaluated last was `far`."""
     memory[at + _NEAR], memory[at + _HERE] = near, here
     memory[at + _FAR], memory[at + _THERE] = far, there
@@ -69,13 +73,13 @@ def between(memory, at, near, here, far, there, tolerance):
 
 
 @lean
-def searching(memory, at):
+def searching(memory: np.ndarray, at: int) -> bool:
     """Return whether the function has to be evaluated once more."""
     return memory[at + _PHASE] != _DONE
 
 
 @lean
-def proceed(memory, at, value):
+def proceed(memory: np.ndarray, at: int, value: float) -> float:
     """Return where to evaluate next, given the value at the place before."""
     near, here, far = memory[at + _NEAR], memory[at + _HERE], memory[at + _FAR]
     if memory[at + _PHASE] == _BETWEEN:
@@ -110,7 +114,7 @@ def proceed(memory, at, value):
 
 
 @lean
-def _next(memory, at):
+def _next(memory: np.ndarray, at: int) -> float:
     here, far, there = memory[at + _HERE], memory[at + _FAR], memory[at + _THERE]
     if (abs(there) <= memory[at + _TOLERANCE] or there == here
             or memory[at + _COUNT] >= MOST_ITERATIONS):

@@ -9,7 +9,8 @@ from .jit import jit
 
 
 @jit
-def shares(nodes, inputs, ends, wanted, scale, columns):
+def shares(nodes: np.ndarray, inputs: np.ndarray, ends: np.ndarray, wanted: np.ndarray,
+           scale: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """
     Return twice the share of each cell whose relays are up, then that of each diagonal interval.
 

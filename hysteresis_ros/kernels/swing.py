@@ -1,25 +1,25 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One step of an arm in motion.
+An arm in motion, over one dt.
 
 The muscle pulls with what the arm asks for at rest, less what friction and inertia take:
-``n F r(theta) = tau(theta) - tau_c - b dtheta/dt - I d2theta/dt2``. It gives way as always, so a
-jerk also stretches what is elastic in it, and an arm that swings faster than its muscle shortens
-leaves the muscle loose.
+``n F r(theta) = tau(theta) - tau_c - b dtheta/dt - I d2theta/dt2``. It gives way as always, so an
+acceleration also stretches what is elastic in it, and an arm that swings faster than its muscle
+shortens leaves the muscle loose.
 """
 
 import math
 
 from . import grid, root
 from .arm import (
-    INSIDE, LENGTH, LEVERAGE, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD, REST_SEARCH, SCALE, STRETCH,
-    SWING_GAIN, THETA)
+    Arm, INSIDE, LENGTH, LEVERAGE, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD, REST_SEARCH, SCALE, State,
+    STRETCH, SWING_GAIN, THETA)
 from .bundle import TYPICAL_COMPLIANCE
 from .lean import lean
 from .operator import last_input, peek, step
 
-# Least share of a load that is missing by which the load changes in a step.
+# Least share of a load that is missing by which the load changes in a dt.
 LEAST_GAIN = 1e-3
 # Load that may be missing, over that at rest.
 LOOSER = 1e4
@@ -28,9 +28,10 @@ EXACT = 1e-9
 
 
 @lean
-def swing(arm, state, x, offset, factor, friction, dt):
+def swing(arm: Arm, state: State, x: float, offset: float, factor: float, friction: float,
+          dt: float) -> tuple[int, float]:
     """
-    Commit what the muscle does in a step and return the place at which the step ends.
+    Commit what the muscle does within dt and return the place at which the arm ends.
 
     Parameters
     ----------
@@ -42,14 +43,14 @@ def swing(arm, state, x, offset, factor, friction, dt):
     friction : float
         Moment of dry friction against the motion [N m].
     dt : float
-        Duration of the step [s].
+        Time [s].
     """
     table, memory, motion = arm.wires.table, state.memories[0], state.motion
-    # Friction and inertia are linear in the angle that the step ends at.
+    # Friction and inertia are linear in the angle at the end of dt.
     speed, acceleration = moved(motion, 0.0, dt)
-    faster, jerked = moved(motion, 1.0, dt)
+    faster, more = moved(motion, 1.0, dt)
     drag = friction + arm.viscous * speed + arm.inertia * acceleration
-    slope = arm.viscous * (faster - speed) + arm.inertia * (jerked - acceleration)
+    slope = arm.viscous * (faster - speed) + arm.inertia * (more - acceleration)
     tolerance = LOOSER * arm.tolerance
     start = u = last_input(table, memory)
     k, share, here = _lacking(arm, state, u, x, offset, factor, drag, slope)
@@ -68,7 +69,8 @@ def swing(arm, state, x, offset, factor, friction, dt):
 
 
 @lean
-def acceleration_at(arm, state, x, offset, factor, k, share, drag):
+def acceleration_at(arm: Arm, state: State, x: float, offset: float, factor: float, k: int,
+                    share: float, drag: float) -> float:
     """Return the angular acceleration [rad/s^2] of an arm at a place under a new x."""
     table, memory, motion = arm.wires.table, state.memories[0], state.motion
     wanted = grid.between(arm.grid, LENGTH, k, share)
@@ -87,7 +89,8 @@ def acceleration_at(arm, state, x, offset, factor, k, share, drag):
 
 
 @lean
-def _lacking(arm, state, u, x, offset, factor, drag, slope):
+def _lacking(arm: Arm, state: State, u: float, x: float, offset: float, factor: float, drag: float,
+             slope: float) -> tuple[int, float, float]:
     """Return the place where the muscle with the input u is, and the load missing there."""
     load, length = _muscle(arm, state, u, x, offset, factor)
     k = grid.interval(arm.grid, LENGTH, length, int(state.motion[NEAR_LENGTH]))
@@ -99,7 +102,8 @@ def _lacking(arm, state, u, x, offset, factor, drag, slope):
 
 
 @lean
-def _muscle(arm, state, u, x, offset, factor):
+def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: float
+            ) -> tuple[float, float]:
     """Return the load of the muscle and its elongation."""
     n = grid.interval(arm.loads, INSIDE, u + x, int(state.motion[NEAR_LOAD]))
     state.motion[NEAR_LOAD] = n
@@ -115,20 +119,20 @@ def _muscle(arm, state, u, x, offset, factor):
 
 
 @lean
-def _pull(arm, k, share, drag, slope):
-    """Return the moment that the muscles have to hold at a place where the step may end."""
+def _pull(arm: Arm, k: int, share: float, drag: float, slope: float) -> float:
+    """Return the moment that the muscles have to hold at a place where the arm may end."""
     return (grid.between(arm.grid, MOMENT, k, share) - drag
             - slope * grid.between(arm.grid, THETA, k, share))
 
 
 @lean
-def _needed(arm, k, share, drag, slope):
+def _needed(arm: Arm, k: int, share: float, drag: float, slope: float) -> float:
     """Return the load that the arm asks for there."""
     return _pull(arm, k, share, drag, slope) / grid.between(arm.grid, LEVERAGE, k, share)
 
 
 @lean
-def _fly(arm, drag, slope):
+def _fly(arm: Arm, drag: float, slope: float) -> tuple[int, float]:
     """Return the place of an arm without a pull."""
     low, high = 0, len(arm.grid) - 1
     if _pull(arm, 1, 0.0, drag, slope) <= 0.0:

@@ -5,7 +5,7 @@ The arm from sample to sample, and over a whole trial.
 
 Dry friction lets the load lie in a band, inside which the arm sticks; viscous friction and inertia
 add what the present velocity and acceleration cost: by backward differences, of second order over
-equal steps, and while the arm rings by the method of Fox and Goodwin, Newmark's with beta = 1/12,
+an equal dt, and while the arm rings by the method of Fox and Goodwin, Newmark's with beta = 1/12,
 whose phase is of fourth order.
 """
 
@@ -15,25 +15,25 @@ import numpy as np
 
 from . import bundle, grid
 from .arm import (
-    ACCELERATION, ANGLE, BEFORE_DT, BUNDLE_SEARCH, INERTIAL_RATIO, keep_motion, NEAR, NEAR_LENGTH,
-    NEAR_LOAD, present, REST_GAIN, RINGING, SWING_GAIN, THETA, VELOCITY, X)
+    ACCELERATION, ANGLE, Arm, BEFORE_DT, BUNDLE_SEARCH, INERTIAL_RATIO, keep_motion, NEAR,
+    NEAR_LENGTH, NEAR_LOAD, present, REST_GAIN, RINGING, State, SWING_GAIN, THETA, VELOCITY, X)
 from .jit import jit
 from .lean import lean
 from .operator import last_input, last_output, reset
 from .rest import direction, settle, settle_bundle
 from .swing import acceleration_at, swing
 
-# A step longer than this [s] is a settled state to which dynamics contribute nothing.
+# A dt longer than this [s] is a settled state to which dynamics contribute nothing.
 LONGEST_TRANSIENT = 5.0
-# What rings so fast that a sample would take more steps than this has come to rest by its end.
+# What rings so fast that a sample would take more pieces than this has come to rest by its end.
 MOST_PIECES = 200
 # An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
-# that is small, does not ring, and is followed in longer steps; the share fades from step to step.
+# that is small, does not ring, and is followed at a longer dt; the share fades from piece to piece.
 CALM, FADING = 0.005, 0.97
 
 
 @lean
-def start(arm, state):
+def start(arm: Arm, state: State) -> None:
     """Wipe the memory: after a full heat and cool cycle, before the first sample."""
     for i in range(len(arm.wires.offsets)):
         reset(arm.wires.table, state.memories[i])
@@ -47,7 +47,7 @@ def start(arm, state):
 
 
 @lean
-def output(arm, state):
+def output(arm: Arm, state: State) -> float:
     """Return the output of H2 [m]; the mean of the muscles."""
     if len(arm.wires.offsets) > 1:
         return bundle.mean_output(arm.wires, state.memories)
@@ -55,7 +55,7 @@ def output(arm, state):
 
 
 @lean
-def step(arm, state, x, dt, offset, factor):
+def step(arm: Arm, state: State, x: float, dt: float, offset: float, factor: float) -> float:
     """
     Advance to the next sample and return the angle [rad].
 
@@ -89,8 +89,8 @@ def step(arm, state, x, dt, offset, factor):
 
 
 @lean
-def _kick(arm, state, x, offset, factor):
-    """Begin a step with the acceleration under a new x."""
+def _kick(arm: Arm, state: State, x: float, offset: float, factor: float) -> None:
+    """Begin a dt with the acceleration under a new x."""
     motion = state.motion
     velocity = motion[VELOCITY]
     # An arm that friction holds is not accelerated before it slides.
@@ -103,7 +103,7 @@ def _kick(arm, state, x, offset, factor):
 
 
 @lean
-def _advance(arm, state, x, dt, offset, factor):
+def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor: float) -> float:
     motion = state.motion
     begun = not math.isnan(motion[ANGLE])
     moving = arm.dynamic and dt < LONGEST_TRANSIENT and begun
@@ -132,7 +132,8 @@ def _advance(arm, state, x, dt, offset, factor):
 
 
 @jit
-def run(arm, state, cold, x, dt, offset, factor):
+def run(arm: Arm, state: State, cold: float, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
+        factor: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     """
     Run a whole trial from the cold state.
 

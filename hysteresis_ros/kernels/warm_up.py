@@ -8,23 +8,29 @@ would be a pause of seconds, so each loop is run through once before it counts. 
 installation, `python -m hysteresis_ros.kernels.warm_up` fills the cache.
 """
 
+from __future__ import annotations
+
 import contextlib
 import logging
 import math
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.errors import HysteresisError
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import Controller, MuscleModel
 
 # The first call, one in each direction, and one that changes nothing.
 SHARES = 0.5, 0.9, 0.1, 0.1
 DT = 0.1    # s
 
 
-def warm_up(model=None) -> float:
+def warm_up(model: MuscleModel | None = None) -> float:
     """
-    Run controller and observer of a model through a few steps, and return how long it took.
+    Run controller and observer of a model through a few samples, and return how long it took.
 
     Parameters
     ----------
@@ -43,7 +49,7 @@ def warm_up(model=None) -> float:
     return time.perf_counter() - start
 
 
-def warm_up_controller(model) -> float:
+def warm_up_controller(model: MuscleModel) -> float:
     """Run a controller of the model through a few setpoints; return how long it took [s]."""
     start = time.perf_counter()
     # What a model cannot do, it says when it is asked in earnest.
@@ -51,26 +57,26 @@ def warm_up_controller(model) -> float:
         arm = model.geometry is not None
         for horizon in (math.inf, 1.0):
             controller = model.controller(arm=arm, horizon=horizon)
-            for step, share in enumerate(SHARES):
+            for sample, share in enumerate(SHARES):
                 length, force = _reference(model, controller, share)
-                controller.setpoint(length, force, step * DT, ambient=math.nan)
-                controller.hold(step * DT + 0.5 * DT)
+                controller.setpoint(length, force, sample * DT, ambient=math.nan)
+                controller.hold(sample * DT + 0.5 * DT)
             controller.reset()
     return time.perf_counter() - start
 
 
-def warm_up_observer(model) -> float:
+def warm_up_observer(model: MuscleModel) -> float:
     """Run an observer of the model through a few samples; return how long it took [s]."""
     start = time.perf_counter()
     with contextlib.suppress(HysteresisError):
         observer = model.observer()
-        for step, share in enumerate(SHARES):
-            observer.step(step * DT, _within(model.ranges[model.drive], share), math.nan)
+        for sample, share in enumerate(SHARES):
+            observer.step(sample * DT, _within(model.ranges[model.drive], share), math.nan)
         observer.reset()
     return time.perf_counter() - start
 
 
-def small_model():
+def small_model() -> MuscleModel:
     """Return a two-stage model of the paper's size with few cells and an arm."""
     from hysteresis_ros.bicep.geometry import BicepGeometry
     from hysteresis_ros.model import MuscleModel
@@ -90,18 +96,19 @@ def small_model():
         ranges={'voltage': (0.0, 6.0), 'force': (0.5, 14.5), 'length': (low, high)})
 
 
-def _reference(model, controller, share: float) -> tuple[float, float]:
+def _reference(model: MuscleModel, controller: Controller,
+               share: float) -> tuple[float, float]:
     """Return a length [m] and a force [N] within reach of the arm, or else of the bench."""
     if model.geometry is not None:
         # Far from the ends of the linkage, where a reference may be out of reach.
         angle = _within(model.geometry.angle_range, 0.4 + 0.2 * share)
         with contextlib.suppress(HysteresisError):
-            return tuple(map(float, controller.reference(angle)))
+            return controller.reference(angle)
     return (_within(model.ranges[model.response], share),
-            _within(model.ranges.get(model.load_name, (0.0, 0.0)), share))
+            _within(model.ranges.get(model.load_name or '', (0.0, 0.0)), share))
 
 
-def _within(limits, share: float) -> float:
+def _within(limits: tuple[float, float], share: float) -> float:
     low, high = limits
     return float(low + share * (high - low))
 

@@ -18,7 +18,7 @@ class Errors(NamedTuple):
     Attributes
     ----------
     mean_abs : float
-        Mean of |e|, in the unit of the response.
+        Mean of ``|e|``, in the unit of the response.
     std : float
         Standard deviation of e, divided by M as Eq. 24 needs (its print leaves the M out).
     rmse : float

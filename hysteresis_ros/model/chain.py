@@ -7,19 +7,20 @@ An effect is applied in the order of its stage; one whose equation contains anot
 two time constants contains one with a single time constant) takes its place.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import copy
 import math
+from typing import Any
 
 import numpy as np
 
 from hysteresis_ros.effects import (
     DriveEffect, Effect, Inputs, MaterialEffect, MechanismEffect, SensorEffect, Surroundings,
     catalogue)
-from hysteresis_ros.effects.base import STAGES
+from hysteresis_ros.effects.base import STAGES, Values
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 
-# No wire of an arm yields less than this [m/N].
+# The compliance of no wire of an arm is below this [m/N].
 LEAST_COMPLIANCE = 1e-6
 
 
@@ -44,12 +45,12 @@ class Chain:
         Scales of the muscle.
     """
 
-    def __init__(self, effects: Sequence[Effect], surroundings: Surroundings):
+    def __init__(self, effects: Sequence[Effect], surroundings: Surroundings) -> None:
         # Copies, because what an effect remembers of the past belongs to one chain.
         ordered = [copy.copy(effect) for effect in in_order(effects)]
         self.surroundings = surroundings
         # Voltage and current heat with their square (Eq. 2).
-        self.squared = surroundings.drive in ELECTRIC_DRIVES
+        self.heats_by_square = surroundings.drive in ELECTRIC_DRIVES
         drive = [effect for effect in ordered if isinstance(effect, DriveEffect)]
         self.electrical = [effect for effect in drive if effect.stage == 'electrical']
         self.thermal = [effect for effect in drive if effect.stage == 'thermal']
@@ -63,7 +64,7 @@ class Chain:
         self.start()
 
     @property
-    def offsets(self) -> tuple:
+    def offsets(self) -> tuple[float, ...]:
         """Excess length [m] of each parallel muscle."""
         return next((e.offsets for e in self.material if len(e.offsets) > 1), (0.0,))
 
@@ -79,20 +80,22 @@ class Chain:
                    or type(effect).advance is not MaterialEffect.advance
                    for effect in self.material)
 
-    def to_heat(self, drive):
-        """Return what the drive heats with: its square, with the sign kept, or itself."""
-        return drive * np.abs(drive) if self.squared else drive
+    def to_drive_squared(self, drive: Values) -> Values:
+        """Return the drive squared, sign kept; the drive where it is no voltage or current."""
+        return drive * np.abs(drive) if self.heats_by_square else drive
 
-    def to_drive(self, heat):
-        """Return the drive that stands for a heat: the steady-state voltage of Eq. 2."""
-        return np.sign(heat) * np.sqrt(np.abs(heat)) if self.squared else heat
+    def to_drive(self, drive_squared: Values) -> Values:
+        """Return the drive that has a drive squared: the steady-state voltage of Eq. 2."""
+        if not self.heats_by_square:
+            return drive_squared
+        return np.sign(drive_squared) * np.sqrt(np.abs(drive_squared))
 
-    def heat(self, drive: np.ndarray, inputs: Inputs) -> np.ndarray:
-        """Return the heat that the muscle feels in each row of one trial, shape (rows,)."""
+    def drive_squared(self, drive: np.ndarray, inputs: Inputs) -> np.ndarray:
+        """Return the drive squared that the muscle feels in each row of one trial, (rows,)."""
         signal = drive
         for effect in self.electrical:
             signal = effect.forward(signal, inputs, self.surroundings)
-        signal = self.to_heat(signal)
+        signal = self.to_drive_squared(signal)
         for effect in self.thermal:
             signal = effect.forward(signal, inputs, self.surroundings)
         return signal
@@ -102,11 +105,11 @@ class Chain:
         for effect in self._all():
             effect.start()
 
-    def save(self) -> list:
+    def save(self) -> list[dict[str, Any]]:
         """Return what the effects remember of the past, as plain types."""
         return [effect.save() for effect in self._all()]
 
-    def restore(self, state: list) -> None:
+    def restore(self, state: Sequence[Mapping[str, Any]]) -> None:
         """
         Take back what `save` returned.
 
@@ -118,15 +121,15 @@ class Chain:
         for effect, entry in zip(self._all(), state, strict=True):
             effect.restore(entry)
 
-    def _all(self):
+    def _all(self) -> list[Effect]:
         return [*self.electrical, *self.thermal, *self.material, *self.mechanism, *self.sensor]
 
     def step(self, drive: float, inputs: Inputs) -> float:
-        """Return the heat after one sample of the drive, for a model that runs along."""
+        """Return the drive squared after one more sample, for a model that runs along."""
         signal = drive
         for effect in self.electrical:
             signal = self._advance(effect, signal, inputs)
-        signal = float(self.to_heat(signal))
+        signal = float(self.to_drive_squared(signal))
         for effect in self.thermal:
             signal = self._advance(effect, signal, inputs)
         return signal
@@ -135,11 +138,11 @@ class Chain:
         # One without a past may look at all inputs, such as the ambient temperature.
         if type(effect).step is DriveEffect.step:
             return float(effect.forward(signal, inputs, self.surroundings))
-        return effect.step(signal, inputs.step, inputs.phase, self.surroundings)
+        return effect.step(signal, inputs.dt, inputs.phase, self.surroundings)
 
-    def inverse(self, heat: float, inputs: Inputs) -> float:
-        """Return the drive for a wanted heat, the stages taken in reverse."""
-        signal = heat
+    def inverse(self, drive_squared: float, inputs: Inputs) -> float:
+        """Return the drive for a wanted drive squared, the stages taken in reverse."""
+        signal = drive_squared
         for effect in reversed(self.thermal):
             signal = effect.inverse(signal, inputs, self.surroundings)
         signal = float(self.to_drive(signal))
@@ -147,47 +150,48 @@ class Chain:
             signal = effect.inverse(signal, inputs, self.surroundings)
         return float(signal)
 
-    def load_per_heat(self) -> float:
+    def load_per_drive_squared(self) -> float:
         """Return C of `stress_dependence`, or 0 where the first stage is the model's own."""
-        return sum(effect.load_per_heat for effect in self.material)
+        return sum(effect.load_per_drive_squared for effect in self.material)
 
-    def load_inside(self, load):
+    def load_inside(self, load: Values) -> Values:
         """Return the load as the transformation feels it."""
         return load + sum(effect.shift_load(load, self.surroundings) for effect in self.material)
 
-    def scale(self, load):
+    def scale(self, load: Values) -> Values:
         """Return S(F), the factor on the transformation strain."""
         factor = 1.0
         for effect in self.material:
             factor = factor * effect.scale(load, self.surroundings)
         return factor
 
-    def stretch(self, load):
+    def stretch(self, load: Values) -> Values:
         """Return e(F), the elongation by the load alone."""
         return sum((effect.stretch(load, self.surroundings) for effect in self.material),
                    0.0 * load)
 
     def compliance(self) -> float:
-        """Return what a wire yields elastically [m per unit of u], 0 where that is not known."""
+        """Return the elastic compliance of a wire [m per unit of u], 0 where it is not known."""
         load = self.surroundings.load or 1.0
-        yielded = self.stretch(np.float64(load)) - self.stretch(np.float64(0.0))
+        stretched = self.stretch(np.float64(load)) - self.stretch(np.float64(0.0))
         inside = self.load_inside(np.float64(load)) - self.load_inside(np.float64(0.0))
-        found = float(yielded / max(inside, 1e-3 * load))
+        found = float(stretched / max(inside, 1e-3 * load))
         return found if found >= LEAST_COMPLIANCE else 0.0
 
-    def drift(self, drive, heat, inputs: Inputs) -> tuple[np.ndarray, np.ndarray]:
+    def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs
+              ) -> tuple[np.ndarray, np.ndarray]:
         """Return offset and factor of each row, each shape (rows,)."""
         offset, factor = np.zeros(len(drive)), np.ones(len(drive))
         for effect in self.material:
-            added, times = effect.drift(drive, heat, inputs, self.surroundings)
+            added, times = effect.drift(drive, drive_squared, inputs, self.surroundings)
             offset, factor = offset + added, factor * times
         return offset, factor
 
-    def advance(self, drive: float, heat: float, inputs: Inputs) -> tuple[float, float]:
+    def advance(self, drive: float, drive_squared: float, inputs: Inputs) -> tuple[float, float]:
         """Return offset and factor of the next row, for a model that runs along."""
         offset, factor = 0.0, 1.0
         for effect in self.material:
-            added, times = effect.advance(drive, heat, inputs, self.surroundings)
+            added, times = effect.advance(drive, drive_squared, inputs, self.surroundings)
             offset, factor = offset + added, factor * times
         return offset, factor
 

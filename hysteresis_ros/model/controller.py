@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The inverse that drives the muscle: Eqs. 12 to 14, and every effect that can be undone."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 import copy
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +16,12 @@ from hysteresis_ros.effects import Inputs
 from hysteresis_ros.effects.thermal import LatentHeat
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.muscles import Muscles
 from hysteresis_ros.model.pacing import Pacing
+from hysteresis_ros.model.second_stage import SecondStage
 from hysteresis_ros.model.targets import Targets
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model.muscle import MuscleModel
 
 # Passes that bring a clipped drive into agreement with the phase that it causes.
 PHASE_PASSES = 20
@@ -49,11 +54,11 @@ class Setpoint(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a drive would do: `length` [m], `heat`, and the inputs of the `muscles`."""
+    """What a drive would do: `length` [m], `drive_squared`, and the `inputs` of the muscles."""
 
     length: float
-    heat: float
-    muscles: list
+    drive_squared: float
+    inputs: list[float]
 
 
 class Controller:
@@ -73,8 +78,8 @@ class Controller:
         A reversal of the length by less than this [m] is not followed: right after a reversal the
         inverse amplifies noise without bound.
     horizon : float
-        Time [s] within which a lagging muscle is to reach its heat; it is overdriven meanwhile,
-        within the limits. Call `hold` at least this often. Infinite: never overdriven.
+        Time [s] within which a lagging muscle is to reach its temperature; it is overdriven
+        meanwhile, within the limits. Call `hold` at least this often. Infinite: never overdriven.
     arm : bool
         Whether the muscle lifts the model's arm, whose load it bears while it is cold. Else it
         bears the first reference's force, as on the bench. Calling `reference` says so, too.
@@ -85,8 +90,12 @@ class Controller:
         If the limits make no sense.
     """
 
-    def __init__(self, model, voltage_limits=None, dead_band: float = 0.0,
-                 horizon: float = math.inf, arm: bool = False):
+    # Only of a model with a length stage, and of one with an arm.
+    _second: SecondStage
+    _targets: Targets
+
+    def __init__(self, model: MuscleModel, voltage_limits: tuple[float, float] | None = None,
+                 dead_band: float = 0.0, horizon: float = math.inf, arm: bool = False) -> None:
         self.model = model
         self.limits = tuple(voltage_limits or model.ranges.get(model.drive, (0.0, math.inf)))
         if not self.limits[0] < self.limits[1]:
@@ -103,19 +112,19 @@ class Controller:
                              model.surroundings)
         self._first = model.first_stage(self._chain)
         self._force = copy.deepcopy(model.force_stage)
-        self._muscles = (None if model.length_stage is None else
-                         Muscles(model.require_length_stage(), model.sign, self._chain.offsets,
-                                 self._chain.compliance()))
+        if model.length_stage is not None:
+            self._second = SecondStage(model.require_length_stage(), model.sign,
+                                       self._chain.offsets, self._chain.compliance())
         self._pacing = Pacing(self._chain, self._clip, self._inputs, horizon)
-        self._targets = (None if model.geometry is None else
-                         Targets(model.geometry, self._chain, lambda: self._at_rest()[0]))
-        self._rest = None
+        if model.geometry is not None:
+            self._targets = Targets(model.geometry, self._chain, lambda: self._at_rest()[0])
+        self._rest: tuple[float, list[float]] | None = None
         self._arm = arm
         self.reset()
 
     @property
     def horizon(self) -> float:
-        """Time [s] within which a lagging muscle is to reach its heat."""
+        """Time [s] within which a lagging muscle is to reach its temperature."""
         return self._pacing.horizon
 
     @horizon.setter
@@ -127,31 +136,31 @@ class Controller:
         cold = self.model.cold_drive
         self._chain.start()
         self._steady.start()
-        heat = float(self._chain.to_heat(cold))
+        drive_squared = float(self._chain.to_drive_squared(cold))
         self._first.reset()
-        self._cold = self._first.step(heat)
-        if self._muscles is not None:
-            self._muscles.reset()
+        self._cold = self._first.step(drive_squared)
+        if self.model.length_stage is not None:
+            self._second.reset()
         if self._force is not None:
             self._force.reset()
             self._force.step(cold)
-        if self._targets is not None:
+        if self.model.geometry is not None:
             self._targets.reset()
-        self._pacing.reset(cold, heat)
+        self._pacing.reset(cold, drive_squared)
         self._fresh = True
-        self._ambient = None
+        self._ambient: float | None = None
 
-    def save(self) -> dict:
+    def save(self) -> dict[str, Any]:
         """Return the memory as plain types, fit for JSON and YAML."""
         return {'first': self._first.save(),
-                'muscles': self._muscles.save() if self._muscles is not None else None,
+                'second': self._second.save() if self.model.length_stage is not None else None,
                 'force': self._force.save() if self._force is not None else None,
                 'effects': [self._chain.save(), self._steady.save()],
-                'targets': self._targets.save() if self._targets is not None else {},
+                'targets': self._targets.save() if self.model.geometry is not None else {},
                 'pacing': self._pacing.save(),
                 'fresh': self._fresh, 'arm': self._arm, 'ambient': self._ambient}
 
-    def restore(self, state: Mapping) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """
         Take a saved memory back.
 
@@ -171,15 +180,15 @@ class Controller:
             self._take(before)
             raise ParameterError(f'saved memory does not fit the model ({error})') from None
 
-    def _take(self, state):
+    def _take(self, state: Mapping[str, Any]) -> None:
         self._first.restore(state['first'])
-        if self._muscles is not None:
-            self._muscles.restore(state['muscles'])
+        if self.model.length_stage is not None:
+            self._second.restore(state['second'])
         if self._force is not None:
             self._force.restore(state['force'])
         for chain, entry in zip((self._chain, self._steady), state['effects'], strict=True):
             chain.restore(entry)
-        if self._targets is not None:
+        if self.model.geometry is not None:
             self._targets.restore(**state['targets'])
         self._pacing.restore(**state['pacing'])
         self._fresh, self._arm = bool(state['fresh']), bool(state['arm'])
@@ -213,7 +222,7 @@ class Controller:
         self._arm = True
         return found
 
-    def _at_rest(self):
+    def _at_rest(self) -> tuple[float, list[float]]:
         """Angle of the cold arm, and what its muscles' memories start from."""
         if self._rest is None:
             balance = self.model.balance(self.model.chain())
@@ -254,7 +263,7 @@ class Controller:
         phase = (high - found.output) / max(high - low, 1e-12)
         inputs = self._inputs(0.0, phase, ambient)
         drive, clipped = self._clip(self._steady.inverse(
-            float(self._chain.to_heat(found.input)), inputs))
+            float(self._chain.to_drive_squared(found.input)), inputs))
         applied = float(self._chain.to_drive(self._steady.step(drive, inputs)))
         expected = self._force.step(applied) if commit else self._force.peek(applied)
         if commit:
@@ -292,7 +301,7 @@ class Controller:
         ParameterError
             If the model has no length stage.
         """
-        if self._muscles is None:
+        if self.model.length_stage is None:
             raise ParameterError('the model has no length stage; identify it with a length table')
         if not (math.isfinite(length) and math.isfinite(force)):
             return self._no_number()
@@ -303,12 +312,13 @@ class Controller:
         self._take(before)
         return found
 
-    def _setpoint(self, length, force, time, ambient):
+    def _setpoint(self, length: float, force: float, time: float | None, ambient: float
+                  ) -> Setpoint:
         self._pacing.advance(time)
         load = float(self._chain.load_inside(np.float64(force))) if self._first.loaded else 0.0
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
-            self._muscles.settle_cold(self._cold, load, self._at_rest()[1] if self._arm else None)
+            self._second.settle_cold(self._cold, load, self._at_rest()[1] if self._arm else None)
         inputs = self._inputs(0.0, self._share(length, force), ambient)
         find = self._search if self._steady.drifts else self._invert
         drive, saturated = find(length, force, load, inputs)
@@ -325,31 +335,33 @@ class Controller:
                       f'{limits} {self.model.drive}; expected {1e3 * outcome.length:.3f} mm')
         return Setpoint(applied, saturated, outcome.length, outcome.length - length, reason)
 
-    def _transformed(self, length, force):
+    def _transformed(self, length: float, force: float) -> float:
         """Return what the transformation has to give for a length [m] under a force [N]."""
-        base = self._muscles.base
+        base = self._second.base
         scale = float(self._chain.scale(np.float64(force)))
         return base + (length - base - float(self._chain.stretch(np.float64(force)))) / scale
 
-    def _share(self, length, force):
+    def _share(self, length: float, force: float) -> float:
         """Return the share of martensite at a length [m] under a force [N]."""
         return float(self.model.martensite(self._transformed(length, force)))
 
-    def _invert(self, length, force, load, inputs):
+    def _invert(self, length: float, force: float, load: float, inputs: Inputs
+                ) -> tuple[float, bool]:
         """Drive in closed form, and whether it is out of reach."""
-        x, out_of_reach = self._muscles.drive(
+        x, out_of_reach = self._second.drive(
             self._transformed(length, force), load, self.dead_band)
-        heat, saturated = self._first.invert(x)
-        drive, clipped = self._clip(self._steady.inverse(heat, inputs))
+        drive_squared, saturated = self._first.invert(x)
+        drive, clipped = self._clip(self._steady.inverse(drive_squared, inputs))
         return drive, out_of_reach or saturated or clipped
 
-    def _search(self, length, force, load, inputs):
+    def _search(self, length: float, force: float, load: float, inputs: Inputs
+                ) -> tuple[float, bool]:
         """Drive by a search: the offset of time and use depends on the drive that is sought."""
         low, high = self.limits
         if not math.isfinite(high):
-            high = float(self._chain.to_drive(self._chain.surroundings.heat))
+            high = float(self._chain.to_drive(self._chain.surroundings.full_drive_squared))
 
-        def error(drive):
+        def error(drive: float) -> float:
             return self.model.sign * (
                 self._outcome(drive, force, load, inputs).length - length)
 
@@ -365,28 +377,28 @@ class Controller:
         from scipy.optimize import brentq   # half a second that most models do not need
         return brentq(error, low, high, xtol=1e-14, rtol=1e-14), False
 
-    def _outcome(self, drive, force, load, inputs) -> Outcome:
+    def _outcome(self, drive: float, force: float, load: float, inputs: Inputs) -> Outcome:
         """Say what a drive would do; commits nothing."""
-        heat = self._steady.step(drive, inputs)
-        output, muscles = self._muscles.respond(self._first.peek(heat), load)
+        drive_squared = self._steady.step(drive, inputs)
+        output, committed = self._second.respond(self._first.peek(drive_squared), load)
         offset, factor = 0.0, 1.0
         if self._steady.drifts:
             before = self._steady.save()
-            offset, factor = self._steady.advance(drive, heat, self._worn(inputs, drive))
+            offset, factor = self._steady.advance(drive, drive_squared, self._worn(inputs, drive))
             self._steady.restore(before)
-        base, load = self._muscles.base, np.float64(force)
-        length = (base + float(self._chain.scale(load)) * factor * (output - base)
-                  + float(self._chain.stretch(load)) + offset)
-        return Outcome(length, heat, muscles)
+        base, felt = self._second.base, np.float64(force)
+        length = (base + float(self._chain.scale(felt)) * factor * (output - base)
+                  + float(self._chain.stretch(felt)) + offset)
+        return Outcome(length, drive_squared, committed)
 
-    def _commit(self, drive, outcome, inputs, time):
-        self._first.step(outcome.heat)
-        self._muscles.step(outcome.muscles)
-        self._steady.advance(drive, outcome.heat, self._worn(inputs, drive))
+    def _commit(self, drive: float, outcome: Outcome, inputs: Inputs, time: float | None) -> float:
+        self._first.step(outcome.drive_squared)
+        self._second.step(outcome.inputs)
+        self._steady.advance(drive, outcome.drive_squared, self._worn(inputs, drive))
         self._fresh = False
         if math.isfinite(inputs.ambient):
             self._ambient = inputs.ambient
-        self._pacing.begin(drive, outcome.heat, inputs.phase, time)
+        self._pacing.begin(drive, outcome.drive_squared, inputs.phase, time)
         return self._pacing.drive
 
     def hold(self, time: float) -> float:
@@ -407,17 +419,17 @@ class Controller:
             self._pacing.hold(time)
         return self._pacing.drive
 
-    def _inputs(self, step, phase, ambient=math.nan) -> Inputs:
+    def _inputs(self, dt: float, phase: float, ambient: float = math.nan) -> Inputs:
         if not math.isfinite(ambient) and self._ambient is not None:
             ambient = self._ambient
-        return Inputs(0.0, 0.0, step, ambient, phase, 0.0)
+        return Inputs(0.0, 0.0, dt, ambient, phase, 0.0)
 
-    def _worn(self, inputs, drive):
+    def _worn(self, inputs: Inputs, drive: float) -> Inputs:
         """Return the inputs with the cycles that there will be after `drive`."""
         travel = self._pacing.travel + abs(drive - self._pacing.drive)
         return inputs._replace(cycles=travel / (2.0 * self.model.drive_range))
 
-    def _no_number(self):
+    def _no_number(self) -> Setpoint:
         return Setpoint(self._clip(self._pacing.drive)[0], True, math.nan, math.nan,
                         'the reference is not a finite number')
 

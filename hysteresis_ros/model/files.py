@@ -3,19 +3,21 @@
 """The model file: one YAML mapping, read by safe load only."""
 
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
 from hysteresis_ros.atomic import write_text
 from hysteresis_ros.bicep.geometry import BicepGeometry
-from hysteresis_ros.effects import effect_class
+from hysteresis_ros.effects import Effect, effect_class, Surroundings
 from hysteresis_ros.errors import HysteresisError, ModelFileError
 from hysteresis_ros.model.linear import LinearModel
 from hysteresis_ros.model.muscle import MuscleModel
-from hysteresis_ros.operators import operator_from_dict
+from hysteresis_ros.operators import HysteresisOperator, operator_from_dict
 
 SCHEMA = 1
 # No model comes near these; a file that does is no model, and could bring the parser down.
@@ -23,7 +25,7 @@ LARGEST_FILE = 20_000_000
 DEEPEST_NESTING = 40
 
 
-def to_dict(model: MuscleModel) -> dict:
+def to_dict(model: MuscleModel) -> dict[str, Any]:
     """Return the model as plain types, in the order in which a person reads it."""
     return _plain({
         'schema': SCHEMA, 'kind': model.kind,
@@ -41,7 +43,7 @@ def to_dict(model: MuscleModel) -> dict:
     })
 
 
-def _plain(value):
+def _plain(value: Any) -> Any:
     """Return a copy of plain types: no NumPy numbers, no tuples, nothing shared."""
     if isinstance(value, Mapping):
         return {str(key): _plain(entry) for key, entry in value.items()}
@@ -54,7 +56,7 @@ def _plain(value):
     return value
 
 
-def save(model: MuscleModel, path) -> None:
+def save(model: MuscleModel, path: str | os.PathLike[str]) -> None:
     """
     Write the model; an existing file is replaced only by a complete one.
 
@@ -68,7 +70,7 @@ def save(model: MuscleModel, path) -> None:
                                 width=100))
 
 
-def load(path) -> MuscleModel:
+def load(path: str | os.PathLike[str]) -> MuscleModel:
     """
     Read a model file.
 
@@ -103,7 +105,7 @@ def load(path) -> MuscleModel:
         raise ModelFileError(f'{path}: damaged model file ({first[:120]})') from None
 
 
-def _parse(text: str):
+def _parse(text: str) -> Any:
     """Return the content of YAML text, by safe load only."""
     loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
     depth = 0
@@ -118,7 +120,7 @@ def _parse(text: str):
     return yaml.load(text, Loader=loader)
 
 
-def from_dict(content: Mapping) -> MuscleModel:
+def from_dict(content: Mapping[str, Any]) -> MuscleModel:
     """
     Build the model from what `to_dict` returned.
 
@@ -147,11 +149,11 @@ def from_dict(content: Mapping) -> MuscleModel:
     return model
 
 
-def _operator(content):
+def _operator(content: Mapping[str, Any] | None) -> HysteresisOperator | None:
     return None if content is None else operator_from_dict(content)
 
 
-def _effect(entry: Mapping, surroundings):
+def _effect(entry: Mapping[str, Any], surroundings: Surroundings) -> Effect:
     parameters = entry['parameters']
     effect = effect_class(entry['id'])(surroundings, **{
         name: _number(parameter['value'], name) for name, parameter in parameters.items()})
@@ -160,13 +162,13 @@ def _effect(entry: Mapping, surroundings):
     return effect
 
 
-def _number(value, name: str) -> float:
+def _number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise ModelFileError(f'{name} is {value!r}, it has to be a finite number')
     return float(value)
 
 
-def _limit(value, name: str) -> float:
+def _limit(value: Any, name: str) -> float:
     """End of an interval: data that say nothing leave it open."""
     if isinstance(value, float) and math.isinf(value):
         return value

@@ -5,8 +5,10 @@
 import dataclasses
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hysteresis_ros.errors import ModelFileError
 
@@ -32,28 +34,28 @@ class LinearModel:
     k2: float
     F0: float
 
-    def force(self, drive):
+    def force(self, drive: ArrayLike) -> Any:
         """Force [N] at resting length under `drive`."""
         return self.k1 * np.asarray(drive) + self.F0
 
-    def length(self, drive, load):
+    def length(self, drive: ArrayLike, load: ArrayLike) -> Any:
         """Elongation under `drive` and `load`."""
         return self.k2 * (np.asarray(load) - self.k1 * np.asarray(drive) - self.F0)
 
-    def drive_for_force(self, force):
+    def drive_for_force(self, force: ArrayLike) -> Any:
         """Drive for a force at resting length: Eq. 15 with L = 0."""
         return (np.asarray(force) - self.F0) / self.k1
 
-    def drive_for_length(self, length, load):
+    def drive_for_length(self, length: ArrayLike, load: ArrayLike) -> Any:
         """Drive for an elongation under a load (Eq. 15)."""
         return (np.asarray(load) - self.F0 - np.asarray(length) / self.k2) / self.k1
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, float]:
         """Return the three numbers by name."""
         return {name: float(value) for name, value in dataclasses.asdict(self).items()}
 
     @classmethod
-    def from_dict(cls, content: Mapping) -> 'LinearModel':
+    def from_dict(cls, content: Mapping[str, Any]) -> 'LinearModel':
         """
         Build from what `to_dict` returned.
 

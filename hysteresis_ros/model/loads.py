@@ -2,7 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether the bench has shown the muscle under the loads that an arm puts on it."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model.muscle import MuscleModel
 
 # A load this share of the bench's range beyond its ends is as good as at an end.
 MARGIN = 0.02
@@ -10,14 +17,17 @@ MARGIN = 0.02
 WIDE = 1.5
 
 
-def reached_angles(model) -> np.ndarray:
+def reached_angles(model: MuscleModel) -> np.ndarray:
     """Return angles [rad] of the arm at the lengths that the bench has shown, shape (k,)."""
-    low, high = model.require_geometry().angle_range
-    theta = model.geometry.angle(np.linspace(*model.ranges['length'], 100))
+    geometry = model.require_geometry()
+    low, high = geometry.angle_range
+    shortest, longest = model.ranges['length']
+    theta = geometry.angle(np.linspace(shortest, longest, 100))
     return theta[np.isfinite(theta) & (theta >= low) & (theta <= high)]
 
 
-def uncovered_load(model, theta) -> tuple | None:
+def uncovered_load(model: MuscleModel, theta: np.ndarray) -> (
+        tuple[tuple[float, float], tuple[float, float], bool] | None):
     """
     Compare the load of an arm with those that the model was identified under.
 
@@ -35,11 +45,11 @@ def uncovered_load(model, theta) -> tuple | None:
         or where that is not known.
     """
     loads = np.unique(np.round(model.provenance.get('length', {}).get('loads', ()), 3))
-    known = model.geometry is not None and model.load_name == 'force' and len(loads) > 0
-    if not known or len(theta) == 0:
+    geometry = model.geometry
+    if geometry is None or model.load_name != 'force' or len(loads) == 0 or len(theta) == 0:
         return None
-    low, high = model.geometry.angle_range
-    force = model.geometry.force(np.clip(theta, low, high))
+    low, high = geometry.angle_range
+    force = geometry.force(np.clip(theta, low, high))
     arm = float(np.min(force)), float(np.max(force))
     margin = MARGIN * max(loads[-1] - loads[0], loads[-1])
     if arm[0] < loads[0] - margin or arm[1] > loads[-1] + margin:

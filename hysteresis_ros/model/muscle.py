@@ -2,20 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """The identified model of a muscle: operators, linear model, effects, geometry, provenance."""
 
+from __future__ import annotations
+
 import copy
 import dataclasses
+import os
 from collections.abc import Sequence
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.bicep.balance import ArmBalance
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.effects import Effect, Surroundings
+from hysteresis_ros.effects.base import Values
 from hysteresis_ros.effects.stages import Statics
 from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.linear import LinearModel
 from hysteresis_ros.operators import HysteresisOperator
+
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model.controller import Controller
+    from hysteresis_ros.model.observer import Observer
 
 # A wire cold enough to be fully martensite is one without drive.
 COLD_DRIVE = {'voltage': 0.0, 'current': 0.0, 'pressure': 0.0, 'power': 0.0}
@@ -60,20 +71,20 @@ class MuscleModel:
     force_stage: HysteresisOperator | None = None
     sign: int = -1
     linear: LinearModel | None = None
-    effects: list = dataclasses.field(default_factory=list)
+    effects: list[Effect] = dataclasses.field(default_factory=list)
     geometry: BicepGeometry | None = None
-    ranges: dict = dataclasses.field(default_factory=dict)
+    ranges: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     mean_load: float = 0.0
-    metrics: dict = dataclasses.field(default_factory=dict)
-    provenance: dict = dataclasses.field(default_factory=dict)
+    metrics: dict[str, Any] = dataclasses.field(default_factory=dict)
+    provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     @classmethod
-    def load(cls, path) -> 'MuscleModel':
+    def load(cls, path: str | os.PathLike[str]) -> MuscleModel:
         """Read a model file; see `hysteresis_ros.model.files.load`."""
         from hysteresis_ros.model import files
         return files.load(path)
 
-    def save(self, path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write a model file; see `hysteresis_ros.model.files.save`."""
         from hysteresis_ros.model import files
         files.save(self, path)
@@ -91,11 +102,12 @@ class MuscleModel:
             # A muscle's stroke is about a twentieth of its length.
             length = 20.0 * span
         largest = max(abs(value) for value in self.ranges.get(self.drive, (0.0, 1.0)))
-        heat = float(Chain([], Surroundings(1.0, 1.0, 1.0, 1.0, self.drive)).to_heat(largest))
-        return Surroundings(length, self.mean_load, heat, span, self.drive, self.load_name,
-                            self.response, self.cold_drive, self.drive_range, self.sign)
+        bare = Chain([], Surroundings(1.0, 1.0, 1.0, 1.0, self.drive))
+        return Surroundings(length, self.mean_load, float(bare.to_drive_squared(largest)), span,
+                            self.drive, self.load_name, self.response, self.cold_drive,
+                            self.drive_range, self.sign)
 
-    def with_effects(self, effects: Sequence[Effect]) -> 'MuscleModel':
+    def with_effects(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return a copy with other effects and the same operators."""
         return dataclasses.replace(self, effects=list(effects))
 
@@ -103,9 +115,9 @@ class MuscleModel:
         """Return the stages with the model's effects."""
         return Chain(self.effects, self.surroundings)
 
-    def first_stage(self, chain: Chain) -> 'FirstStage':
-        """Return the map from heat to x, with a memory of its own."""
-        return FirstStage(self, chain)
+    def first_stage(self, chain: Chain) -> FirstStage:
+        """Return the map from drive squared to x, with a memory of its own."""
+        return FirstStage(self.force_stage, chain)
 
     @property
     def cold_drive(self) -> float:
@@ -120,13 +132,13 @@ class MuscleModel:
         low, high = self.ranges.get(self.drive, (0.0, 1.0))
         return max(high - low, 1e-12)
 
-    def martensite(self, output):
+    def martensite(self, output: Values) -> Values:
         """Return the share of the cold phase at an output of H2 [m], 0 to 1, of any shape."""
         low, high = self.require_length_range()
         share = np.clip((output - low) / max(high - low, 1e-12), 0.0, 1.0)
         return share if self.sign < 0 else 1.0 - share
 
-    def predict(self, measurement, method: str = 'preisach') -> np.ndarray:
+    def predict(self, measurement: Measurement, method: str = 'preisach') -> np.ndarray:
         """
         Simulate the response of every row from the inputs alone.
 
@@ -154,12 +166,12 @@ class MuscleModel:
             raise ParameterError(f'method must be preisach or linear, not {method!r}')
         return simulation.predict(self, measurement)
 
-    def controller(self, **options):
+    def controller(self, **options: Any) -> Controller:
         """Return the inverse with memory; see `Controller`."""
         from hysteresis_ros.model.controller import Controller
         return Controller(self, **options)
 
-    def observer(self):
+    def observer(self) -> Observer:
         """Return the forward model that runs along with a recording; see `Observer`."""
         from hysteresis_ros.model.observer import Observer
         return Observer(self)
@@ -202,77 +214,16 @@ class MuscleModel:
 
     def require_length_stage(self) -> HysteresisOperator:
         """Return a copy of H2 with its memory wiped; ModelFileError if the model has none."""
-        self.require_length_range()
-        operator = copy.deepcopy(self.length_stage)
+        operator = copy.deepcopy(self._length_stage())
         operator.reset()
         return operator
 
     def require_length_range(self) -> tuple[float, float]:
         """Return what H2 can give; ModelFileError if the model has none."""
+        return self._length_stage().output_range
+
+    def _length_stage(self) -> HysteresisOperator:
         if self.length_stage is None:
             raise ModelFileError(
                 'the model has no length stage; identify it with a length table')
-        return self.length_stage.output_range
-
-
-class FirstStage:
-    """
-    From the heat that the muscle feels to x, in the unit of the load.
-
-    In the paper's model x = H1[V]. With `stress_dependence` on the bench x = C V^2 takes its place,
-    because temperature, not blocked force, is then what the load is weighed against. A model
-    without a first stage takes the drive as it is.
-    """
-
-    def __init__(self, model: MuscleModel, chain: Chain):
-        self._chain = chain
-        self.load_per_heat = chain.load_per_heat()
-        self.loaded = self.load_per_heat > 0.0 or model.force_stage is not None
-        self._operator = None
-        if self.load_per_heat == 0.0 and model.force_stage is not None:
-            self._operator = copy.deepcopy(model.force_stage)
-            self._operator.reset()
-
-    def reset(self) -> None:
-        """Wipe the memory."""
-        if self._operator is not None:
-            self._operator.reset()
-
-    def save(self) -> dict:
-        """Return the memory."""
-        return self._operator.save() if self._operator is not None else {}
-
-    def restore(self, state: dict) -> None:
-        """Take a saved memory back."""
-        if self._operator is not None:
-            self._operator.restore(state)
-
-    def simulate(self, heat: np.ndarray) -> np.ndarray:
-        """Return x for the heat of consecutive rows, shape (rows,)."""
-        if self.load_per_heat > 0.0:
-            return self.load_per_heat * heat
-        drive = self._chain.to_drive(heat)
-        return self._operator.simulate(drive) if self._operator is not None else drive
-
-    def step(self, heat: float) -> float:
-        """Commit one sample."""
-        if self.load_per_heat > 0.0:
-            return self.load_per_heat * heat
-        drive = float(self._chain.to_drive(heat))
-        return self._operator.step(drive) if self._operator is not None else drive
-
-    def invert(self, x: float) -> tuple[float, bool]:
-        """Return the heat for x, and whether x is out of reach."""
-        if self.load_per_heat > 0.0:
-            return x / self.load_per_heat, False
-        if self._operator is None:
-            return float(self._chain.to_heat(x)), False
-        found = self._operator.invert(x)
-        return float(self._chain.to_heat(found.input)), found.saturated
-
-    def peek(self, heat: float) -> float:
-        """Return x without committing."""
-        if self.load_per_heat > 0.0:
-            return self.load_per_heat * heat
-        drive = float(self._chain.to_drive(heat))
-        return self._operator.peek(drive) if self._operator is not None else drive
+        return self.length_stage

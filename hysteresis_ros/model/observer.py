@@ -2,9 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The forward model that runs along with the arm, one sample at a time."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 from hysteresis_ros.effects import Inputs
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model.muscle import MuscleModel
 
 # Beyond, in any unit, it is no drive: its square would overflow what the lags remember.
 LARGEST_DRIVE = 1e12
@@ -30,7 +36,7 @@ class Observer:
         If it has no length stage.
     """
 
-    def __init__(self, model):
+    def __init__(self, model: MuscleModel) -> None:
         self.model = model
         self._chain = model.chain()
         self._first = model.first_stage(self._chain)
@@ -51,7 +57,7 @@ class Observer:
         self._chain.start()
         self._first.reset()
         self._balance.start()
-        rest = self._balance.settle(self._first.step(float(self._chain.to_heat(cold))))
+        rest = self._balance.settle(self._first.step(float(self._chain.to_drive_squared(cold))))
         for effect in self._chain.sensor:
             effect.begin(rest)
         self._time = time
@@ -87,9 +93,9 @@ class Observer:
         self._time, self._drive = time, drive
         inputs = Inputs(time, time, dt, ambient, self._phase,
                         self._travel / (2.0 * self.model.drive_range))
-        heat = self._chain.step(drive, inputs)
-        offset, factor = self._chain.advance(drive, heat, inputs)
-        angle = self._balance.step(self._first.step(heat), dt, offset, factor)
+        drive_squared = self._chain.step(drive, inputs)
+        offset, factor = self._chain.advance(drive, drive_squared, inputs)
+        angle = self._balance.step(self._first.step(drive_squared), dt, offset, factor)
         if self._chain.needs_phase:
             self._phase = float(self.model.martensite(self._balance.output))
         for effect in self._chain.sensor:

@@ -1,8 +1,13 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Overdriving a muscle that lags, so that it reaches its heat within a time of its own."""
+"""Overdriving a muscle that lags, so that it gets to a temperature within a given time."""
 
+from collections.abc import Callable
 import math
+from typing import Any
+
+from hysteresis_ros.effects import Inputs
+from hysteresis_ros.model.chain import Chain
 
 # What a longer time between two calls of `hold` counts in the next one.
 FADING = 0.9
@@ -10,7 +15,7 @@ FADING = 0.9
 
 class Pacing:
     """
-    What is applied to a lagging muscle on the way to a heat.
+    What is applied to a lagging muscle on the way to a temperature.
 
     Parameters
     ----------
@@ -19,12 +24,13 @@ class Pacing:
     clip : callable
         Brings a drive within the limits.
     inputs : callable
-        Gives the `Inputs` for a time step [s] and a phase.
+        Gives the `Inputs` for a dt [s] and a phase.
     horizon : float
-        Time [s] within which the heat is to be reached; infinite: never overdriven.
+        Time [s] within which it is to be reached; infinite: never overdriven.
     """
 
-    def __init__(self, chain, clip, inputs, horizon: float):
+    def __init__(self, chain: Chain, clip: Callable[[float], tuple[float, bool]],
+                 inputs: Callable[..., Inputs], horizon: float) -> None:
         self._chain = chain
         self._clip = clip
         self._inputs = inputs
@@ -32,25 +38,26 @@ class Pacing:
         # How far the drive has gone up and down; heating and cooling does not undo that.
         self.travel = 0.0
 
-    def reset(self, drive: float, heat: float) -> None:
-        """Start from the cold muscle with this drive and heat."""
+    def reset(self, drive: float, drive_squared: float) -> None:
+        """Start from the cold muscle with this drive and drive squared."""
         self.drive = drive
-        self._time = None
+        self._time: float | None = None
         self._period = self._deadline = 0.0
-        self._heat = heat
+        self._drive_squared = drive_squared
         self._phase = 1.0
 
-    def save(self) -> dict:
+    def save(self) -> dict[str, Any]:
         """Return what is remembered, as plain types."""
         return {'drive': self.drive, 'travel': self.travel, 'time': self._time,
-                'period': self._period, 'deadline': self._deadline, 'heat': self._heat,
-                'phase': self._phase}
+                'period': self._period, 'deadline': self._deadline,
+                'drive_squared': self._drive_squared, 'phase': self._phase}
 
     def restore(self, drive: float, travel: float, time: float | None, period: float,
-                deadline: float, heat: float, phase: float) -> None:
+                deadline: float, drive_squared: float, phase: float) -> None:
         """Take back what `save` returned."""
         self.drive, self.travel, self._time = drive, travel, time
-        self._period, self._deadline, self._heat, self._phase = period, deadline, heat, phase
+        self._period, self._deadline = period, deadline
+        self._drive_squared, self._phase = drive_squared, phase
 
     def advance(self, time: float | None) -> float:
         """Let the muscle feel what was applied until now, and return for how long [s]."""
@@ -71,21 +78,23 @@ class Pacing:
         self.travel += abs(drive - self.drive)
         self.drive = drive
 
-    def begin(self, drive: float, heat: float, phase: float, time: float | None) -> None:
-        """Set out for a heat that `drive` keeps in the end; `advance` has to come before."""
-        self._heat, self._phase = heat, phase
+    def begin(self, drive: float, drive_squared: float, phase: float,
+              time: float | None) -> None:
+        """Set out for what `drive` keeps in the end; `advance` has to come before."""
+        self._drive_squared, self._phase = drive_squared, phase
         if time is not None and math.isfinite(time) and math.isfinite(self.horizon):
             self._deadline, self._period = time + self.horizon, 0.0
             drive = self._towards(self.horizon)
         self.apply(drive)
 
     def hold(self, time: float) -> None:
-        """Go on towards the heat; the first call at the horizon or after it ends overdriving."""
+        """Go on towards it; the first call at the horizon or after it ends overdriving."""
         # The next call may be late: longer than a period overdriven, the muscle would swing.
         self._period = max(self.advance(time), FADING * self._period)
         if math.isfinite(self.horizon) and self._time is not None:
             self.apply(self._towards(max(self._deadline - self._time, self._period)))
 
-    def _towards(self, duration):
-        """Drive that brings the muscle to the heat within a time [s], as the limits let."""
-        return self._clip(self._chain.inverse(self._heat, self._inputs(duration, self._phase)))[0]
+    def _towards(self, duration: float) -> float:
+        """Return the drive that gets the muscle there within a time [s], as the limits let."""
+        inputs = self._inputs(duration, self._phase)
+        return self._clip(self._chain.inverse(self._drive_squared, inputs))[0]

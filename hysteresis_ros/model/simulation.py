@@ -2,25 +2,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulation of a whole measurement from its inputs alone, trial by trial."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import copy
 import dataclasses
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
-from hysteresis_ros.bicep.balance import statics_of
+from hysteresis_ros.bicep.balance import ArmBalance, statics_of
 from hysteresis_ros.effects import Effect, Inputs
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.first_stage import FirstStage
+from hysteresis_ros.operators import HysteresisOperator
+
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model.muscle import MuscleModel
 
 # Rows of a settled table without times are this far apart [s] (Sec. III-A).
 HOLD = 30.0
 # Passes at most that bring an effect that depends on the phase into agreement with the phase it
 # causes, to this share of martensite, with steps of at least this part of the difference.
 PHASE_PASSES, AGREEMENT, SHORTEST = 10, 2e-3, 0.2
-# The same for an arm in motion, which takes many more steps.
+# The same for an arm in motion, which has many more rows.
 MOVING_PASSES = 4
 
 
@@ -48,7 +56,7 @@ class Response(NamedTuple):
     rest: float | None = None
 
 
-def trials_of(model, measurement) -> list[Trial]:
+def trials_of(model: MuscleModel, measurement: Measurement) -> list[Trial]:
     """
     Split a measurement into trials with the inputs that effects may look at.
 
@@ -83,13 +91,13 @@ def trials_of(model, measurement) -> list[Trial]:
             time = HOLD * np.arange(1, count + 1)
         else:
             time = measurement.time[rows]
-        step = np.diff(time, prepend=0.0)
+        dt = np.diff(time, prepend=0.0)
         if measurement.settled:
             # The first row is a settled state, too, even where its time is 0.
-            step[0] = max(step[0], HOLD)
+            dt[0] = max(dt[0], HOLD)
         travelled = travel + np.cumsum(np.abs(np.diff(values, prepend=model.cold_drive)))
         inputs = Inputs(
-            time=time, clock=clock + time, step=step,
+            time=time, clock=clock + time, dt=dt,
             ambient=ambient[rows] if ambient is not None else np.full(count, np.nan),
             phase=np.full(count, np.nan), cycles=travelled / (2.0 * max(high - low, 1e-12)))
         trials.append(Trial(rows, values, load[rows], inputs))
@@ -110,7 +118,7 @@ class Simulator:
         Whose inputs are simulated.
     """
 
-    def __init__(self, model, measurement):
+    def __init__(self, model: MuscleModel, measurement: Measurement) -> None:
         self.model = model
         self.measurement = measurement
         self.trials = trials_of(model, measurement)
@@ -119,7 +127,8 @@ class Simulator:
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
 
-    def run(self, effects: Sequence[Effect], inputs_of_stage: list | None = None) -> np.ndarray:
+    def run(self, effects: Sequence[Effect],
+            inputs_of_stage: list[np.ndarray] | None = None) -> np.ndarray:
         """
         Simulate with these effects.
 
@@ -183,23 +192,24 @@ class Simulator:
 
     def _agree(self, respond: Callable, trial: Trial, passes: int) -> Response:
         """Return the response with the phase that it has itself, by Aitken's relaxation."""
-        phase, left, part = np.ones(len(trial.drive)), None, 1.0
+        phase, residual, part = np.ones(len(trial.drive)), None, 1.0
         for _ in range(passes):
             response = respond(trial, trial.inputs._replace(phase=phase))
-            before, left = left, self._phase(response.output) - phase
-            if np.sqrt(np.mean(left ** 2)) < AGREEMENT:
+            before, residual = residual, self._phase(response.output) - phase
+            if np.sqrt(np.mean(residual ** 2)) < AGREEMENT:
                 break
             if before is not None:
-                change = left - before
+                change = residual - before
                 part *= -float(before @ change) / max(float(change @ change), 1e-300)
                 part = min(max(part, SHORTEST), 1.0)
-            phase = phase + part * left
+            phase = phase + part * residual
         return response
 
-    def _phase(self, given):
+    def _phase(self, given: np.ndarray) -> np.ndarray:
         """Martensite share as the operator's output shows it."""
-        if self.measurement.response == 'force':
-            low, high = self.model.force_stage.output_range
+        stage = self.model.force_stage
+        if self.measurement.response == 'force' and stage is not None:
+            low, high = stage.output_range
             return np.clip((high - given) / max(high - low, 1e-12), 0.0, 1.0)
         return self.model.martensite(given)
 
@@ -219,68 +229,50 @@ class Simulator:
         stage = self.model.require_length_stage()
         return lambda trial, inputs: self._length(chain, first, stage, trial, inputs)
 
-    def _first(self, chain, first, trial, inputs):
-        """Cold x, x of each row, and heat of each row."""
-        heat = chain.heat(trial.drive, inputs)
-        cold = chain.to_heat(self.model.cold_drive)
+    def _first(self, chain: Chain, first: FirstStage, trial: Trial, inputs: Inputs
+               ) -> tuple[float, np.ndarray, np.ndarray]:
+        """Return x in the cold state, and x and drive squared of each row."""
+        drive_squared = chain.drive_squared(trial.drive, inputs)
+        cold = chain.to_drive_squared(self.model.cold_drive)
         first.reset()
-        x = first.simulate(np.concatenate(([cold], heat)))
-        return float(x[0]), x[1:], heat
+        x = first.simulate(np.concatenate(([cold], drive_squared)))
+        return float(x[0]), x[1:], drive_squared
 
-    def _force(self, chain, operator, trial, inputs):
-        drive = chain.to_drive(chain.heat(trial.drive, inputs))
+    def _force(self, chain: Chain, operator: HysteresisOperator, trial: Trial, inputs: Inputs
+               ) -> Response:
+        drive = chain.to_drive(chain.drive_squared(trial.drive, inputs))
         operator.reset()
         operator.step(self.model.cold_drive)
         force = operator.simulate(drive)
         return Response(force, force)
 
-    def _length(self, chain, first, stage, trial, inputs):
+    def _length(self, chain: Chain, first: FirstStage, stage: HysteresisOperator, trial: Trial,
+                inputs: Inputs) -> Response:
         model = self.model
-        cold, x, heat = self._first(chain, first, trial, inputs)
+        cold, x, drive_squared = self._first(chain, first, trial, inputs)
         load = chain.load_inside(trial.load) if first.loaded else 0.0 * trial.load
         stage.reset()
         stage.step(model.sign * (cold - load[0]))
         output = stage.simulate(model.sign * (x - load))
         base = stage.output_range[0]
-        offset, factor = chain.drift(trial.drive, heat, inputs)
+        offset, factor = chain.drift(trial.drive, drive_squared, inputs)
         return Response(base + chain.scale(trial.load) * factor * (output - base)
                         + chain.stretch(trial.load) + offset, output)
 
-    def _angle(self, chain, first, balance, trial, inputs):
-        cold, x, heat = self._first(chain, first, trial, inputs)
-        offset, factor = chain.drift(trial.drive, heat, inputs)
-        rest, angles, outputs, stage_inputs = balance.run(cold, x, inputs.step, offset, factor)
+    def _angle(self, chain: Chain, first: FirstStage, balance: ArmBalance, trial: Trial,
+               inputs: Inputs) -> Response:
+        cold, x, drive_squared = self._first(chain, first, trial, inputs)
+        offset, factor = chain.drift(trial.drive, drive_squared, inputs)
+        rest, angles, outputs, stage_inputs = balance.run(cold, x, inputs.dt, offset, factor)
         return Response(angles, outputs, stage_inputs, rest)
 
 
-def turning_rows(x: np.ndarray) -> np.ndarray:
-    """
-    Say which rows a rate-independent memory must see: the turns of x, its first and its last.
-
-    Parameters
-    ----------
-    x : ndarray, shape (rows,)
-
-    Returns
-    -------
-    ndarray of bool, shape (rows,)
-    """
-    keep = np.zeros(len(x), dtype=bool)
-    keep[[0, -1]] = True
-    change = np.sign(np.diff(x))
-    # Over a rest the last direction counts.
-    moving = np.flatnonzero(change)
-    turns = moving[1:][change[moving[1:]] != change[moving[:-1]]]
-    keep[turns] = True
-    return keep
-
-
-def predict(model, measurement) -> np.ndarray:
+def predict(model: MuscleModel, measurement: Measurement) -> np.ndarray:
     """Simulate every row of a measurement with the model and its effects, shape (rows,)."""
     return Simulator(model, measurement).run(model.effects)
 
 
-def predict_linear(model, measurement) -> np.ndarray:
+def predict_linear(model: MuscleModel, measurement: Measurement) -> np.ndarray:
     """
     Predict every row with the linear model (Eq. 11), shape (rows,).
 
@@ -300,7 +292,8 @@ def predict_linear(model, measurement) -> np.ndarray:
         load = measurement.columns.get(model.load_name) if model.load_name else None
         return model.linear.length(drive, np.zeros(len(drive)) if load is None else load)
     geometry = model.require_geometry()
-    theta = np.linspace(*geometry.angle_range, 2000)
+    low, high = geometry.angle_range
+    theta = np.linspace(low, high, 2000)
     needed = model.linear.drive_for_length(geometry.length(theta), geometry.force(theta))
     # The drive falls with the angle; where the load's slope would turn that round, stay.
     needed = np.minimum.accumulate(needed)

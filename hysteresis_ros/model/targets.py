@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a target angle to what each muscle has to do, effects of arm and sensor undone."""
 
+from collections.abc import Callable
 import math
+from typing import Any
 
 import numpy as np
 
-from hysteresis_ros.bicep.geometry import Reference
+from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
 from hysteresis_ros.effects import Statics
 from hysteresis_ros.errors import RangeError
+from hysteresis_ros.model.chain import Chain
 
 
 class Targets:
@@ -25,7 +28,8 @@ class Targets:
         Gives the angle [rad] from which the cold arm starts.
     """
 
-    def __init__(self, geometry, chain, angle_at_rest):
+    def __init__(self, geometry: BicepGeometry, chain: Chain, angle_at_rest: Callable[[], float]
+                 ) -> None:
         self._geometry = geometry
         self._chain = chain
         self._angle_at_rest = angle_at_rest
@@ -33,10 +37,10 @@ class Targets:
 
     def reset(self) -> None:
         """Forget the targets before: the arm is cold."""
-        self._angle = None
+        self._angle: float | None = None
         self._direction = 0.0
 
-    def save(self) -> dict:
+    def save(self) -> dict[str, Any]:
         """Return what is remembered of the targets before, as plain types."""
         return {'angle': self._angle, 'direction': self._direction}
 
@@ -65,7 +69,7 @@ class Targets:
             self._chain.restore(before)
             raise
 
-    def _hold(self, theta, true):
+    def _hold(self, theta: float, true: float) -> Reference:
         geometry = self._geometry
         statics = Statics.of(geometry, np.array([true]))
         for effect in self._chain.mechanism:

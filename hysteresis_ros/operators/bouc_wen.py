@@ -4,7 +4,7 @@
 The normalised Bouc-Wen operator, solved exactly between reversals.
 
 In the normalised form (F. Ikhouane and J. Rodellar, Systems with Hysteresis, Wiley 2007, Sec. 2.4)
-the hidden state w in [-1, 1] follows the input u by
+the hidden state w in [-1, 1] follows the input u by ::
 
     dw = rho (du - sigma |du| |w|^(n-1) w + (sigma - 1) du |w|^n)
 
@@ -262,5 +262,5 @@ class BoucWen(HysteresisOperator):
         """Build the operator from what `to_dict` returned; ParameterError if it cannot be."""
         names = ('stiffness', 'gain', 'rate', 'shape', 'exponent', 'bias', 'lower', 'upper')
         # Files written before there were dead zones do not name them.
-        return cls(*(take(parameters, name, 'Bouc-Wen operator') for name in names),
-                   parameters.get('thresholds', ()), parameters.get('bends', ()))
+        curve = {name: parameters.get(name, ()) for name in ('thresholds', 'bends')}
+        return cls(*(take(parameters, name, 'Bouc-Wen operator') for name in names), **curve)

@@ -64,8 +64,9 @@ class Cascade:
 
     def simulate(self, inputs: np.ndarray) -> np.ndarray:
         """Commit a sequence of inputs, shape (M, S), and return the outputs, shape (M,)."""
-        y = 0.0
-        for stage, x in zip(self.stages, np.asarray(inputs, dtype=float).T, strict=True):
+        columns = np.asarray(inputs, dtype=float).T
+        y = np.zeros(columns.shape[1:])
+        for stage, x in zip(self.stages, columns, strict=True):
             y = stage.simulate(x - y)
         return y
 

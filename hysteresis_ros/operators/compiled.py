@@ -27,18 +27,19 @@ class CompiledOperator(HysteresisOperator):
     table: np.ndarray
     memory: np.ndarray
 
+    # The attributes of the base class, read from the memory.
     @property
-    def input(self) -> float:
+    def input(self) -> float:   # type: ignore[override]
         """Last committed input, inside the range."""
         return self.memory.item(layout.INPUT)
 
     @property
-    def output(self) -> float:
+    def output(self) -> float:  # type: ignore[override]
         """Output that it gave."""
         return self.memory.item(layout.OUTPUT)
 
     @property
-    def saturated(self) -> bool:
+    def saturated(self) -> bool:    # type: ignore[override]
         """Whether the last committed input was outside the range, or not a finite number."""
         return self.memory.item(layout.SATURATED) != 0.0
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from .base import LARGEST, input_range, memory, number, numbers, one_sign, resolution, take
 from .compiled import CompiledOperator
+from .dead_zones import DeadZones
 from ..errors import ParameterError
 from ..kernels import layout, play as kernel
 
@@ -56,8 +57,8 @@ class PrandtlIshlinskii(CompiledOperator):
         where = 'play operator'
         self.radii, self.weights = numbers(radii, f'{where}: radii'), numbers(
             weights, f'{where}: weights')
-        self.thresholds, self.bends = numbers(thresholds, f'{where}: thresholds'), numbers(
-            bends, f'{where}: bends')
+        curve = DeadZones(thresholds, bends, where)
+        self.thresholds, self.bends = curve.thresholds, curve.bends
         self.bias = number(bias, f'{where}: bias')
         self.lower, self.upper = input_range(lower, upper, where)
         if len(self.radii) == 0 or np.any(self.radii < 0.0) or np.any(np.diff(self.radii) <= 0.0):
@@ -66,23 +67,15 @@ class PrandtlIshlinskii(CompiledOperator):
             raise ParameterError(f'{where}: {len(self.weights)} weights for '
                                  f'{len(self.radii)} radii')
         sign = one_sign(self.weights, f'{where}: weights')
-        if np.any(np.diff(self.thresholds) <= 0.0) or len(self.bends) != len(self.thresholds):
-            raise ParameterError(f'{where}: thresholds have to be strictly increasing, with one '
-                                 'bend each')
-        gains = 1.0 + np.cumsum(self.bends)
-        if np.any(gains <= 0.0):
-            raise ParameterError(f'{where}: the bends turn the slope of the output to '
-                                 f'{np.min(gains)}, it has to stay positive')
-        for array in (self.radii, self.weights, self.thresholds, self.bends):
+        for array in (self.radii, self.weights):
             array.flags.writeable = False
 
         # The outputs at the thresholds; the inverse of the dead zones searches among them.
-        over = np.maximum(self.thresholds[:, None] - self.thresholds, 0.0)
-        bent = self.bias + self.thresholds + np.sum(self.bends * over, axis=-1)
+        bent = self.bias + curve.values(self.thresholds)
         self.table = np.concatenate((
             [layout.PLAY, self.lower, self.upper, sign, 0.0, 0.0, 0.0, len(self.radii),
              len(self.bends), self.bias],
-            self.radii, self.weights, self.thresholds, self.bends, bent, gains))
+            self.radii, self.weights, self.thresholds, self.bends, bent, curve.slopes[1:]))
         self.memory = np.empty(layout.MEMORY + len(self.radii))
         self.reset()
         ends = self.peek(self.lower), self.peek(self.upper)

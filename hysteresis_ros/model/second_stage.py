@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The second stage as a controller needs it: one muscle, or parallel ones of unequal length."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import copy
+from typing import Any
 
 from hysteresis_ros.bicep.bundle import Bundle
+from hysteresis_ros.operators import HysteresisOperator
 
 # Elongation [m] by which elastic wires may leave the range of the transformation.
 ELASTIC_ROOM = 0.02
 
 
-class Muscles:
+class SecondStage:
     """
     H2 with its memory: ``output = H2[sign (x - load)]``, and the inverse for x (Eq. 13).
 
@@ -24,10 +26,11 @@ class Muscles:
     offsets : tuple of float
         Excess length [m] of each parallel muscle; one entry for equal muscles.
     compliance : float
-        What a wire yields elastically [m/N].
+        Elastic compliance of a wire [m/N].
     """
 
-    def __init__(self, operator, sign: int, offsets: tuple, compliance: float):
+    def __init__(self, operator: HysteresisOperator, sign: int,
+                 offsets: tuple[float, ...], compliance: float) -> None:
         self._bundle = Bundle(operator, offsets, compliance) if len(offsets) > 1 else None
         self._operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self._sign = sign
@@ -39,11 +42,11 @@ class Muscles:
         for operator in self._operators:
             operator.reset()
 
-    def save(self) -> list:
+    def save(self) -> list[dict[str, Any]]:
         """Return the memory as plain types."""
         return [operator.save() for operator in self._operators]
 
-    def restore(self, state: Sequence) -> None:
+    def restore(self, state: Sequence[Mapping[str, Any]]) -> None:
         """
         Take back what `save` returned.
 
@@ -55,7 +58,7 @@ class Muscles:
         for operator, entry in zip(self._operators, state, strict=True):
             operator.restore(entry)
 
-    def settle_cold(self, x: float, load: float, inputs: Sequence | None = None) -> None:
+    def settle_cold(self, x: float, load: float, inputs: Sequence[float] | None = None) -> None:
         """
         Start from the cold state.
 
@@ -84,7 +87,7 @@ class Muscles:
         return self._bundle.respond(
             x, load, self.base - self._room, self._top + self._room, self.base)
 
-    def step(self, inputs: Sequence) -> None:
+    def step(self, inputs: Sequence[float]) -> None:
         """Commit each muscle's input."""
         for operator, u in zip(self._operators, inputs):
             operator.step(u)
