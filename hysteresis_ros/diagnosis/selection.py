@@ -70,6 +70,8 @@ class Selection:
         self._grown: set[frozenset] = set()
         self._refined: set[frozenset] = set()
         self._least_errors: dict[frozenset, float] = {}
+        # With the response that each belongs to.
+        self._errors: dict[frozenset, tuple[np.ndarray, float]] = {}
         self.limit = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised | None = None
         self.p_values: dict[str, float] = {}
@@ -200,6 +202,7 @@ class Selection:
             self.fits[names] = self.fitter.refined(self.fits[names])
             least = self.fitter.least_squares(self.fits[names])
             self._least_errors[names] = self.fitter.error(least.predicted)
+            self._errors.pop(names, None)
         self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
         self.base = self.fits[frozenset()]
 
@@ -230,9 +233,14 @@ class Selection:
 
     def error(self, names) -> float:
         """Return the RMSE of a set on all judged rows, fitted by least squares."""
-        if names not in self._least_errors:
-            return self.fitter.least_error(self.fits[names])
-        return min(self._least_errors[names], self.fitter.error(self.fits[names].predicted))
+        fit = self.fits[names]
+        known = self._errors.get(names)
+        if known is None or known[0] is not fit.predicted:
+            least = self._least_errors.get(names)
+            found = (self.fitter.least_error(fit) if least is None
+                     else min(least, self.fitter.error(fit.predicted)))
+            self._errors[names] = known = (fit.predicted, found)
+        return known[1]
 
     def structure(self, names) -> float:
         """Return the root mean square of a set's residual without white noise."""
@@ -252,11 +260,14 @@ class Selection:
         All values are physical, and each effect matters: without it the error is larger by a
         practical size and by more than the expected error of the base model, and if others stay,
         it is larger than the base model's own error could be, or these are clearly less probable.
-        A single effect also has to explain more than the best of all would by chance.
+        A single effect also has to explain more than the best of all would by chance; and no set
+        of as few effects leaves less by more than the base model's error and that of an effect's
+        equation could be.
         """
-        return [names for names in self.ranked()
-                if not self.fits[names].implausible() and self._each_matters(names)
-                and (len(names) != 1 or self.p_values.get(*names, 1.0) <= SIGNIFICANCE)]
+        physical = [names for names in self.ranked() if not self.fits[names].implausible()]
+        return [names for names in physical if self._each_matters(names)
+                and (len(names) != 1 or self.p_values.get(*names, 1.0) <= SIGNIFICANCE)
+                and not self._surpassed(names, physical)]
 
     def _each_matters(self, names) -> bool:
         error = self.error(names)
@@ -270,6 +281,13 @@ class Selection:
                     or (without and self._would_do(without, names))):
                 return False
         return True
+
+    def _surpassed(self, names, others) -> bool:
+        """Whether another set of as few effects predicts far better."""
+        form = self.settings.form * self.error(frozenset())
+        least = self.error(names) ** 2 - self.covariance.size ** 2 - form ** 2
+        return least > 0.0 and any(self.error(other) ** 2 < least for other in others
+                                   if 0 < len(other) <= len(names))
 
     def _would_do(self, without, names) -> bool:
         """Whether a smaller set suffices and is not clearly less probable than the larger one."""
