@@ -193,6 +193,22 @@ def test_slack_keeps_the_penalty_from_spoiling_the_fit():
     assert limited.strength < free.strength
 
 
+def test_only_strengths_within_the_slack_are_tried():
+    nodes, rows, target, groups = preisach_problem()
+    target = target * (1.0 + 0.2 * groups)
+    options = {'groups': groups, 'scale': cell_areas(nodes), 'penalty': smoothness(nodes)}
+    free = fit_weights(rows, target, **options)
+    limited = fit_weights(rows, target, slack=SLACK, **options)
+    limit = SLACK[0] * limited.output_range + (1.0 + SLACK[1]) * fit_weights(
+        rows, target, strength=STRENGTHS[0], **options).rmse
+    within = [fit_weights(rows, target, strength=strength, **options).rmse <= limit
+              for strength in STRENGTHS]
+    count = len(limited.strengths)
+    assert within == [True] * count + [False] * (len(STRENGTHS) - count) and count > 1
+    assert limited.validation == pytest.approx(free.validation[:count], rel=1e-6)
+    assert limited.held_out_rmse == limited.validation.min()
+
+
 def test_penalty_picks_one_of_many_solutions():
     nodes, rows, target, groups = preisach_problem()
     fit = fit_weights(rows, target, groups=groups, scale=cell_areas(nodes),

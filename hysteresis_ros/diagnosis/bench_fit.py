@@ -6,7 +6,7 @@ import dataclasses
 import functools
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize, special    # its stats take a second to import
 
 from hysteresis_ros.diagnosis.arm_fit import DIFFERENCE, Fit
 from hysteresis_ros.diagnosis.observable import unaffected
@@ -142,6 +142,6 @@ class BenchFitter:
         count = len(scores)
         freedom = max(count - len(parameters), 1)
         covariance = count / freedom * inverse @ (scores.T @ scores) @ inverse
-        half = stats.t.ppf(0.5 + level / 2.0, freedom) * np.sqrt(
+        half = special.stdtrit(freedom, 0.5 + level / 2.0) * np.sqrt(
             np.maximum(np.diag(covariance), 0.0))
         return parameters.with_intervals(fit.vector, half)

@@ -315,7 +315,7 @@ class BenchProblem(Problem):
         best = None
         for factor in FINER:
             fit, design = self.fit_stage(effects, round(factor * self.levels))
-            if best is not None and fit.validation.min() > (1.0 - WORTH) * best[0].validation.min():
+            if best is not None and fit.held_out_rmse > (1.0 - WORTH) * best[0].held_out_rmse:
                 break
             best = fit, design
         fit, design = best
