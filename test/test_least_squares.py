@@ -124,6 +124,20 @@ def test_quick_solution_is_the_careful_one():
     assert again == pytest.approx(weights, abs=1e-12)
 
 
+@pytest.mark.parametrize('rows, columns', [(148, 231), (30, 120), (300, 60)])
+def test_weights_are_those_of_scipy_from_any_start(rows, columns):
+    rng = np.random.default_rng(rows)
+    design, target = rng.normal(size=(rows, columns)), rng.normal(size=rows)
+    expected, _ = optimize.nnls(np.vstack([design, np.eye(columns)]),
+                                np.append(target, np.zeros(columns)), maxiter=10000)
+    gram, moment = design.T @ design + np.eye(columns), design.T @ target
+    bounded = np.zeros(columns, dtype=bool)
+    for start in (None, expected > 0.0, expected == 0.0, rng.random(columns) < 0.5):
+        x, passive = solve_nonnegative(gram, moment, bounded, start)
+        assert x == pytest.approx(expected, abs=1e-12)
+        assert np.array_equal(passive, expected > 0.0)
+
+
 def test_no_weight_is_below_zero_by_rounding():
     # A free bias far above them hides the sign of weights that are zero but for rounding.
     x, _ = solve_nonnegative(np.eye(3), np.array([-1e-14, 1e-14, 1.0]),
