@@ -43,7 +43,8 @@ class Response:
         self._fixed = unaffected(fixed, effects)
         self._fitted = slice(None) if rows is None else rows
         self._scale = max(float(np.std(problem.measured)), 1e-12)
-        self._solutions, self._derivatives = {}, {}
+        self._alone = [ParameterVector([effect], problem.kind) for effect in effects]
+        self._values, self._solutions, self._derivatives = {}, {}, {}
 
     def minimise(self, start, evaluations: int, tolerance: float) -> np.ndarray:
         """Return the vector (k,) of least squares near a start."""
@@ -87,7 +88,16 @@ class Response:
         return (near - solution.predicted) / (moved[index] - vector[index])
 
     def _effects(self, vector):
-        return self._fixed + self.parameters.with_vector(vector)
+        """Return all effects; one that did not move is made once."""
+        found, begin = list(self._fixed), 0
+        for number, alone in enumerate(self._alone):
+            part = vector[begin:begin + len(alone)]
+            begin += len(alone)
+            key = number, part.tobytes()
+            if key not in self._values:
+                self._values[key] = alone.with_vector(part)[0]
+            found.append(self._values[key])
+        return found
 
 
 class BenchFitter:
