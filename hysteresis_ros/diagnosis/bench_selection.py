@@ -170,9 +170,8 @@ def _alone(fitter, name):
 def _together(fitter, effects):
     """Fit and cross-validate some effects, from usual values and from those that each had."""
     with np.errstate(all='ignore'):
-        return _finite(fitter, lambda: min(
-            (fitter.fit(start) for start in (usual(effects, fitter.problem.kind), effects)),
-            key=lambda fit: fitter.error(fit.predicted)))
+        return _finite(fitter, lambda: fitter.best_of(
+            [usual(effects, fitter.problem.kind), effects]))
 
 
 def _finite(fitter, make):
