@@ -49,8 +49,9 @@ def pivot(gram, moment, free, passive, tolerance, rounding):
         largest = 0.0
         for k in range(len(index)):
             x[index[k]] = values[k]
+            value, row = values[k], gram[index[k]]
             for j in range(size):
-                gradient[j] += values[k] * gram[index[k], j]
+                gradient[j] += value * row[j]
             largest = max(largest, abs(values[k]))
         count = last = 0
         for k in range(size):
@@ -100,8 +101,10 @@ def solved(gram, moment, index):
         for j in range(i + 1, count):
             share = factor[i, j]
             values[j] -= share * values[i]
-            for k in range(j, count):
-                factor[j, k] -= share * factor[i, k]
+            # Slices from 0 on, because numba divides only such loops among vector registers.
+            above, row = factor[i, j:], factor[j, j:]
+            for k in range(len(row)):
+                row[k] -= share * above[k]
     for i in range(count - 1, -1, -1):
         for j in range(i + 1, count):
             values[i] -= factor[i, j] * values[j]
