@@ -54,6 +54,12 @@ def test_a_step_that_makes_it_worse_is_not_taken():
     assert abs(np.arctan(found[0])) <= np.arctan(3.0)
 
 
+def test_residuals_that_are_not_finite_end_the_search_where_it_is():
+    start, bound = np.array([0.5]), np.array([1.0])
+    found = minimise(lambda x: x * np.nan, lambda x: np.eye(1), start, -bound, bound, 9, 0.0)
+    assert found == start
+
+
 def test_a_step_ends_at_a_bound_and_the_others_follow():
     curvature, gradient = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-0.9, -0.3])
     step = damped_step(curvature, gradient, 0.0, np.full(2, -9.0), np.array([0.2, 9.0]))

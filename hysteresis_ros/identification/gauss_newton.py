@@ -26,7 +26,7 @@ def minimise(residual: Callable[[np.ndarray], np.ndarray],
              jacobian: Callable[[np.ndarray], np.ndarray], start: np.ndarray, lower: np.ndarray,
              upper: np.ndarray, evaluations: int, tolerance: float) -> np.ndarray:
     """
-    Return the vector of least squares near a start.
+    Return the vector of least squares near a start; the last one where something is not finite.
 
     Parameters
     ----------
@@ -51,6 +51,8 @@ def minimise(residual: Callable[[np.ndarray], np.ndarray],
         if normal is None:
             slopes = jacobian(vector)
             normal = slopes.T @ slopes, slopes.T @ errors
+        if not all(np.all(np.isfinite(part)) for part in normal):
+            break
         step = damped_step(*normal, damping, lower - vector, upper - vector)
         errors_there = residual(vector + step)
         cost_there = float(errors_there @ errors_there)
