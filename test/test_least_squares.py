@@ -124,6 +124,20 @@ def test_quick_solution_is_the_careful_one():
     assert again == pytest.approx(weights, abs=1e-12)
 
 
+@pytest.mark.parametrize('rows, columns', [(148, 231), (30, 120), (300, 60)])
+def test_weights_are_those_of_scipy_from_any_start(rows, columns):
+    rng = np.random.default_rng(rows)
+    design, target = rng.normal(size=(rows, columns)), rng.normal(size=rows)
+    expected, _ = optimize.nnls(np.vstack([design, np.eye(columns)]),
+                                np.append(target, np.zeros(columns)), maxiter=10000)
+    gram, moment = design.T @ design + np.eye(columns), design.T @ target
+    bounded = np.zeros(columns, dtype=bool)
+    for start in (None, expected > 0.0, expected == 0.0, rng.random(columns) < 0.5):
+        x, passive = solve_nonnegative(gram, moment, bounded, start)
+        assert x == pytest.approx(expected, abs=1e-12)
+        assert np.array_equal(passive, expected > 0.0)
+
+
 def test_no_weight_is_below_zero_by_rounding():
     # A free bias far above them hides the sign of weights that are zero but for rounding.
     x, _ = solve_nonnegative(np.eye(3), np.array([-1e-14, 1e-14, 1.0]),
@@ -191,6 +205,22 @@ def test_slack_keeps_the_penalty_from_spoiling_the_fit():
     limit = weakest.rmse * (1.0 + SLACK[1]) + SLACK[0] * weakest.output_range
     assert free.rmse > limit >= limited.rmse
     assert limited.strength < free.strength
+
+
+def test_only_strengths_within_the_slack_are_tried():
+    nodes, rows, target, groups = preisach_problem()
+    target = target * (1.0 + 0.2 * groups)
+    options = {'groups': groups, 'scale': cell_areas(nodes), 'penalty': smoothness(nodes)}
+    free = fit_weights(rows, target, **options)
+    limited = fit_weights(rows, target, slack=SLACK, **options)
+    limit = SLACK[0] * limited.output_range + (1.0 + SLACK[1]) * fit_weights(
+        rows, target, strength=STRENGTHS[0], **options).rmse
+    within = [fit_weights(rows, target, strength=strength, **options).rmse <= limit
+              for strength in STRENGTHS]
+    count = len(limited.strengths)
+    assert within == [True] * count + [False] * (len(STRENGTHS) - count) and count > 1
+    assert limited.validation == pytest.approx(free.validation[:count], rel=1e-6)
+    assert limited.held_out_rmse == limited.validation.min()
 
 
 def test_penalty_picks_one_of_many_solutions():

@@ -158,7 +158,7 @@ def test_something_that_happened_once_has_its_time(model):
     time, log_posterior = events.most_probable(found.problem, found)
     assert abs(time - found.problem.clock[row]) <= 60.0
     best = max((found.log_posterior(names) for names in found.valid()), default=-np.inf)
-    assert log_posterior > best / found.settings.temper
+    assert log_posterior > best
     told = diagnose(model, [measured], ['payload_error', 'supply_sag'])
     assert (told.verdict, told.missing, told.event) == ('unknown', [], time)
 

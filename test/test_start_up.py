@@ -53,6 +53,12 @@ except SystemExit:
 """, ('numba', 'matplotlib', 'joblib')) == []
 
 
+def test_identification_imports_neither_optimisers_nor_distributions():
+    """They take longer to import than bench tables take to be fitted."""
+    assert imported_by('import hysteresis_ros.diagnosis.bench_effects',
+                       ('scipy.optimize', 'scipy.stats', 'joblib')) == []
+
+
 @pytest.mark.parametrize('node', ['geometry', 'bridge'])
 def test_nodes_that_simulate_nothing_import_nothing_slow(node):
     """The geometry needs no model, and a real port no simulated arm."""

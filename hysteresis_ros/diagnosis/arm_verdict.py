@@ -93,13 +93,10 @@ class _Verdict:
         return sorted(effects, key=alone)
 
     def _log_mass(self, valid) -> float:
-        temper = self.settings.temper
-        return max((self.selection.log_posterior(names) / temper for names in valid),
-                   default=-np.inf)
+        return max((self.selection.log_posterior(names) for names in valid), default=-np.inf)
 
     def _probabilities(self, valid, event_log) -> dict:
         """Return the posterior probability of each set, and of 'unknown'."""
-        temper = self.settings.temper
         # What does not suffice needs one cause more, as improbable as any other effect. Drift and
         # discrepancy stand for that cause, and are no evidence against a set that does suffice.
         further = math.log(self.settings.prior / (1.0 - self.settings.prior))
@@ -107,7 +104,7 @@ class _Verdict:
         most = max((logs[names] for names in valid if self.selection.sufficient(names)),
                    default=np.inf)
         weights = {names: (value if self.selection.sufficient(names)
-                           else min(value, most) + further) / temper
+                           else min(value, most) + further)
                    for names, value in logs.items()}
         top = max([event_log, *weights.values()])
         mass = {names: math.exp(value - top) for names, value in weights.items()}
@@ -157,11 +154,11 @@ class _Verdict:
             return found
         for name in chosen:
             selection.grow(chosen - {name})
-        best = selection.log_posterior(chosen) / self.settings.temper
+        best = selection.log_posterior(chosen)
         least = best + math.log(self.settings.reported)
         for names in selection.valid():
             if (names == chosen or len(names) != len(chosen)
-                    or selection.log_posterior(names) / self.settings.temper < least
+                    or selection.log_posterior(names) < least
                     or not selection.sufficient(names)):
                 continue
             places, new = sorted(chosen - names), sorted(names - chosen)

@@ -3,14 +3,14 @@
 """Fit the parameters of effects to bench tables, and test the fit on rows that were held out."""
 
 import dataclasses
-import functools
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import special    # its stats take a second to import
 
 from hysteresis_ros.diagnosis.arm_fit import DIFFERENCE, Fit
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.identification.gauss_newton import minimise
 
 # Starts that are followed for a few steps after all were tried once, if their mean square error is
 # not larger than the best's by this factor; the best goes on.
@@ -19,6 +19,85 @@ FOLLOWED_STARTS, WORTH_FOLLOWING, FIRST_EVALUATIONS = 2, 2.0, 4
 SAME = 9
 MOST_EVALUATIONS, HELD_OUT_EVALUATIONS = 8, 3
 TOLERANCE = 1e-3
+
+
+class Response:
+    """
+    The response as a function of the parameters of some effects, H2's weights refitted.
+
+    Parameters
+    ----------
+    problem : BenchProblem
+        Rows.
+    fixed : sequence of Effect
+        Other effects, which stay as they are.
+    effects : sequence of Effect
+        Effects with the parameters that are fitted.
+    rows : ndarray of bool, shape (n,), optional
+        Rows that weights and parameters are fitted to; all by default.
+    """
+
+    def __init__(self, problem, fixed, effects, rows=None):
+        self.problem, self.rows = problem, rows
+        self.parameters = ParameterVector(effects, problem.kind)
+        self._fixed = unaffected(fixed, effects)
+        self._fitted = slice(None) if rows is None else rows
+        self._scale = max(float(np.std(problem.measured)), 1e-12)
+        self._alone = [ParameterVector([effect], problem.kind) for effect in effects]
+        self._values, self._solutions, self._derivatives = {}, {}, {}
+
+    def minimise(self, start, evaluations: int, tolerance: float) -> np.ndarray:
+        """Return the vector (k,) of least squares near a start."""
+        if len(start) == 0:
+            return start
+        return minimise(
+            lambda vector: (self.predicted(vector) - self.problem.measured)[
+                self._fitted] / self._scale,
+            lambda vector: self.jacobian(vector)[self._fitted] / self._scale,
+            start, self.parameters.lower, self.parameters.upper, evaluations, tolerance)
+
+    def fit(self, vector) -> Fit:
+        """Return the effects with the values of a vector (k,), and what they predict."""
+        return Fit(self.parameters.with_vector(vector), vector, self.predicted(vector),
+                   self.jacobian(vector))
+
+    def predicted(self, vector) -> np.ndarray:
+        """Return the response of all rows, shape (n,)."""
+        return self._solution(vector).predicted
+
+    def jacobian(self, vector) -> np.ndarray:
+        """Return the derivatives of the response, shape (n, k)."""
+        key = vector.tobytes()
+        if key not in self._derivatives:
+            columns = [self._derivative(vector, index) for index in range(len(vector))]
+            self._derivatives[key] = np.stack(columns, axis=1) if columns else np.zeros(
+                (len(self.problem.measured), 0))
+        return self._derivatives[key]
+
+    def _solution(self, vector):
+        key = vector.tobytes()
+        if key not in self._solutions:
+            self._solutions[key] = self.problem.solve(self._effects(vector), self.rows)
+        return self._solutions[key]
+
+    def _derivative(self, vector, index):
+        solution, moved = self._solution(vector), np.array(vector)
+        inside = vector[index] + DIFFERENCE < self.parameters.upper[index]
+        moved[index] += DIFFERENCE if inside else -DIFFERENCE
+        near = self.problem.near(solution, self._effects(moved), self.rows)
+        return (near - solution.predicted) / (moved[index] - vector[index])
+
+    def _effects(self, vector):
+        """Return all effects; one that did not move is made once."""
+        found, begin = list(self._fixed), 0
+        for number, alone in enumerate(self._alone):
+            part = vector[begin:begin + len(alone)]
+            begin += len(alone)
+            key = number, part.tobytes()
+            if key not in self._values:
+                self._values[key] = alone.with_vector(part)[0]
+            found.append(self._values[key])
+        return found
 
 
 class BenchFitter:
@@ -35,7 +114,7 @@ class BenchFitter:
         self.problem = problem
         self.fixed = list(problem.model.effects)
 
-    def fit(self, effects, rows=None, evaluations: int = MOST_EVALUATIONS,
+    def fit(self, effects, evaluations: int = MOST_EVALUATIONS,
             tolerance: float = TOLERANCE) -> Fit:
         """
         Fit from the present values of `effects`, by least squares within their bounds.
@@ -44,50 +123,14 @@ class BenchFitter:
         ----------
         effects : sequence of Effect
             Effects to fit; their values are the start.
-        rows : ndarray of bool, shape (n,), optional
-            Rows to fit; all by default.
         evaluations : int
-            Steps of the optimiser at most.
+            Responses that the optimiser looks at, at most.
         tolerance : float
             A step that lowers the sum of squares by a smaller share is the last.
         """
-        problem, parameters = self.problem, ParameterVector(effects, self.problem.kind)
-        kept = unaffected(self.fixed, effects)
-        chosen = np.ones(len(problem.measured), dtype=bool) if rows is None else rows
-
-        @functools.cache
-        def solved(key):
-            vector = np.frombuffer(key)
-            return problem.solve(kept + parameters.with_vector(vector), rows)
-
-        def response(vector):
-            return solved(np.asarray(vector).tobytes()).predicted
-
-        if len(parameters) == 0:
-            predicted = response(np.zeros(0))
-            return Fit(list(effects), np.zeros(0), predicted, np.zeros((len(predicted), 0)))
-
-        @functools.cache
-        def derivatives(key):
-            vector, columns = np.frombuffer(key), []
-            for index, value in enumerate(vector):
-                step = DIFFERENCE if value + DIFFERENCE < parameters.upper[index] else -DIFFERENCE
-                moved = np.array(vector)
-                moved[index] += step
-                near = problem.near(solved(key), kept + parameters.with_vector(moved), rows)
-                columns.append((near - solved(key).predicted) / step)
-            return np.column_stack(columns)
-
-        scale = max(float(np.std(problem.measured)), 1e-12)
-        inside = 1e-6 * (parameters.upper - parameters.lower)
-        found = optimize.least_squares(
-            lambda vector: (response(vector) - problem.measured)[chosen] / scale,
-            np.clip(parameters.vector(), parameters.lower + inside, parameters.upper - inside),
-            jac=lambda vector: derivatives(vector.tobytes())[chosen] / scale,
-            bounds=(parameters.lower, parameters.upper), method='trf', x_scale=1.0,
-            xtol=1e-3, ftol=tolerance, gtol=1e-8, max_nfev=evaluations)
-        return Fit(parameters.with_vector(found.x), found.x, response(found.x),
-                   derivatives(found.x.tobytes()))
+        response = Response(self.problem, self.fixed, effects)
+        return response.fit(response.minimise(
+            response.parameters.vector(), evaluations, tolerance))
 
     def search(self, known, effect) -> Fit:
         """
@@ -108,9 +151,18 @@ class BenchFitter:
         _, order = np.unique(np.round(np.array(errors) / spread, SAME), return_index=True)
         followed = [starts[index] for index in order[:1 if known else FOLLOWED_STARTS]
                     if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
-        begun = min((self.fit([*known, start], evaluations=FIRST_EVALUATIONS)
-                     for start in followed), key=lambda fit: self.error(fit.predicted))
-        return self.fit(begun.effects)
+        return self.best_of([[*known, start] for start in followed])
+
+    def best_of(self, starts) -> Fit:
+        """Follow several starts, each a list of effects, for a few steps, and fit the best."""
+        begun = []
+        for effects in starts:
+            response = Response(self.problem, self.fixed, effects)
+            vector = response.minimise(
+                response.parameters.vector(), FIRST_EVALUATIONS, TOLERANCE)
+            begun.append((self.error(response.predicted(vector)), len(begun), response, vector))
+        _, _, response, vector = min(begun)
+        return response.fit(response.minimise(vector, MOST_EVALUATIONS, TOLERANCE))
 
     def error(self, predicted) -> float:
         """Return the root mean square error of a response."""
@@ -121,7 +173,9 @@ class BenchFitter:
         held_out = np.empty(len(self.problem.measured))
         for fold in self.problem.folds:
             test = self.problem.fold == fold
-            held_out[test] = self.fit(fit.effects, ~test, HELD_OUT_EVALUATIONS).predicted[test]
+            response = Response(self.problem, self.fixed, fit.effects, ~test)
+            vector = response.minimise(fit.vector, HELD_OUT_EVALUATIONS, TOLERANCE)
+            held_out[test] = response.predicted(vector)[test]
         return dataclasses.replace(fit, held_out=held_out)
 
     def with_intervals(self, fit: Fit, level: float = 0.95) -> list:
@@ -142,6 +196,6 @@ class BenchFitter:
         count = len(scores)
         freedom = max(count - len(parameters), 1)
         covariance = count / freedom * inverse @ (scores.T @ scores) @ inverse
-        half = stats.t.ppf(0.5 + level / 2.0, freedom) * np.sqrt(
+        half = special.stdtrit(freedom, 0.5 + level / 2.0) * np.sqrt(
             np.maximum(np.diag(covariance), 0.0))
         return parameters.with_intervals(fit.vector, half)

@@ -68,13 +68,64 @@ class Course:
     """
     What H2 is given, trial after trial, and what is done to its output.
 
-    `inputs` (rows + trials,) begin each trial with the cold one; `scales` and `known` (rows,)
-    multiply the output above its least and are added to it.
+    `scales` and `known` (rows,) multiply the output above its least and are added to it.
     """
 
-    inputs: np.ndarray
+    excitation: 'Excitation'
     scales: np.ndarray
     known: np.ndarray
+
+
+class Excitation:
+    """
+    What H2 is given, and what each of its weights makes of it.
+
+    Most effects change what is done to H2's output and not this.
+
+    Parameters
+    ----------
+    inputs : ndarray, shape (rows + trials,)
+        Trial after trial, each of which begins with the cold one.
+    ends : ndarray of int, shape (trials,)
+        Where each trial ends.
+    wanted : ndarray of bool, shape (rows + trials,)
+        Inputs whose output is judged.
+    """
+
+    def __init__(self, inputs, ends, wanted):
+        self.inputs = inputs
+        self._ends, self._wanted = ends, wanted
+        self._nodes, self._shares = {}, {}
+
+    def nodes(self, levels: int) -> np.ndarray:
+        """Return a grid of equal intervals over the inputs, shape (levels + 1,)."""
+        if levels not in self._nodes:
+            low, high = self.inputs.min(), self.inputs.max()
+            margin = 1e-6 * max(high - low, 1e-12)
+            self._nodes[levels] = np.linspace(low - margin, high + margin, levels + 1)
+        return self._nodes[levels]
+
+    def shares(self, levels: int, scale: np.ndarray, columns=None) -> np.ndarray:
+        """
+        Return what `kernels.shares` does, of all columns or of some that end with the bias.
+
+        Parameters
+        ----------
+        levels : int
+        scale : ndarray, shape (n,)
+        columns : ndarray of int, shape (C,), optional
+        """
+        nodes = self.nodes(levels)
+        if levels not in self._shares:
+            if columns is not None:
+                return shares(nodes, self.inputs, self._ends, self._wanted, scale, columns)
+            self._shares[levels] = shares(
+                nodes, self.inputs, self._ends, self._wanted, np.ones(len(scale)),
+                np.arange(len(_scale(nodes)) + 1))
+        found = self._shares[levels]
+        found = (found if columns is None else found[:, columns]) * scale[:, None]
+        found[:, -1] = 1.0
+        return found
 
 
 class BenchProblem(Problem):
@@ -103,8 +154,9 @@ class BenchProblem(Problem):
         self._wanted = np.zeros(self._ends[-1], dtype=bool)
         self._wanted[self._judged + np.repeat(np.arange(1, len(counts) + 1), counts)[
             self._judged]] = True
+        self._surroundings = model.surroundings
         self._passive = {}
-        self._courses = {}
+        self._courses, self._excitations = {}, {}
         self._square = None
         self._phases_of = self._known_phases = None
 
@@ -112,58 +164,57 @@ class BenchProblem(Problem):
         if phases is None and any(effect.needs_phase for effect in effects):
             phases = self._phases(effects, train)
         course = self._course(effects, phases)
-        nodes = self._nodes(course, levels or self.levels)
+        levels = levels or self.levels
         scale, known = (column[self._judged] for column in (course.scales, course.known))
-        if columns is None:
-            columns = np.arange(len(_scale(nodes)) + 1)
-        rows = shares(nodes, course.inputs, self._ends, self._wanted, scale, columns)
-        return Design(rows, known, nodes)
+        return Design(course.excitation.shares(levels, scale, columns), known,
+                      course.excitation.nodes(levels))
 
     def _course(self, effects, phases) -> Course:
         key = tuple((effect.id, *effect.values.values()) for effect in effects)
         if phases is not None or key not in self._courses:
-            course = self._new_course(Chain(effects, self.model.surroundings), phases)
+            course = self._new_course(Chain(effects, self._surroundings), phases)
             if phases is not None:
                 return course
             # Folds that are held out in turn begin at the same effects.
-            self._courses[key] = course
-            if len(self._courses) > MOST_COURSES:
-                del self._courses[next(iter(self._courses))]
+            _remember(self._courses, key, course)
         return self._courses[key]
 
     def _new_course(self, chain, phases) -> Course:
-        model, first, load = self.model, self.model.first_stage(chain), self._load
-        cold = chain.to_drive_squared(model.cold_drive)
-        heats, drifts = [], []
+        load, cold = self._load, chain.to_drive_squared(self.model.cold_drive)
+        driven, drifts = [], []
         for number, trial in enumerate(self._trials):
             inputs = trial.inputs
             if phases is not None:
                 inputs = inputs._replace(phase=phases[number])
-            heat = chain.drive_squared(trial.drive, inputs)
-            heats += [[cold], heat]
+            squared = chain.drive_squared(trial.drive, inputs)
+            driven += [[cold], squared]
             if chain.drifts:
-                drifts.append(chain.drift(trial.drive, heat, inputs))
-        x = self._first(first, np.concatenate(heats))
-        if first.loaded:
-            x -= chain.load_inside(load)[self._felt]
+                drifts.append(chain.drift(trial.drive, squared, inputs))
         offset, factor = np.concatenate(drifts, axis=1) if drifts else (0.0, 1.0)
-        return Course(model.sign * x, chain.scale(load) * factor + 0.0 * load,
-                      chain.stretch(load) + offset)
+        return Course(self._excitation(chain, np.concatenate(driven)),
+                      chain.scale(load) * factor + 0.0 * load, chain.stretch(load) + offset)
 
-    def _first(self, first, heat):
-        """Return x for the heat of all trials, each from the cold state."""
-        x, begin = np.empty(len(heat)), 0
+    def _excitation(self, chain, squared) -> Excitation:
+        """Return what H2 is given for the drive squared of all trials, shape (rows + trials,)."""
+        inside = chain.load_inside(self._load)
+        key = squared.tobytes(), inside.tobytes(), chain.load_per_drive_squared()
+        if key not in self._excitations:
+            first = self.model.first_stage(chain)
+            x = self._first(first, squared)
+            if first.loaded:
+                x -= inside[self._felt]
+            _remember(self._excitations, key,
+                      Excitation(self.model.sign * x, self._ends, self._wanted))
+        return self._excitations[key]
+
+    def _first(self, first, squared):
+        """Return x for the drive squared of all trials, each from the cold state."""
+        x, begin = np.empty(len(squared)), 0
         for end in self._ends:
             first.reset()
-            x[begin:end] = first.simulate(heat[begin:end])
+            x[begin:end] = first.simulate(squared[begin:end])
             begin = end
         return x
-
-    @staticmethod
-    def _nodes(course, levels):
-        low, high = course.inputs.min(), course.inputs.max()
-        margin = 1e-6 * max(high - low, 1e-12)
-        return np.linspace(low - margin, high + margin, levels + 1)
 
     def _phases(self, effects, train) -> list:
         """
@@ -187,7 +238,7 @@ class BenchProblem(Problem):
         """Return the martensite share that H2 shows in every row of each trial."""
         model = dataclasses.replace(self.model, length_stage=stage)
         found = []
-        inputs = self._course(effects, phases).inputs
+        inputs = self._course(effects, phases).excitation.inputs
         for part in np.split(inputs, self._ends[:-1]):
             stage.reset()
             stage.step(part[0])
@@ -315,7 +366,7 @@ class BenchProblem(Problem):
         best = None
         for factor in FINER:
             fit, design = self.fit_stage(effects, round(factor * self.levels))
-            if best is not None and fit.validation.min() > (1.0 - WORTH) * best[0].validation.min():
+            if best is not None and fit.held_out_rmse > (1.0 - WORTH) * best[0].held_out_rmse:
                 break
             best = fit, design
         fit, design = best
@@ -324,6 +375,13 @@ class BenchProblem(Problem):
         metrics['length'] = {**metrics.get('length', {}), **left_out(fit, self.trial)}
         return dataclasses.replace(
             self.model, effects=list(effects), length_stage=stage, metrics=metrics)
+
+
+def _remember(found, key, value):
+    """Add an entry to a dict of the latest ones."""
+    found[key] = value
+    if len(found) > MOST_COURSES:
+        del found[next(iter(found))]
 
 
 def _stage(nodes, weights, bias):

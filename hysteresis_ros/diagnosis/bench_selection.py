@@ -147,8 +147,8 @@ class BenchSelection:
         count = len(np.unique(self.problem.block))
         odds = math.log(self.settings.prior / (1.0 - self.settings.prior))
         logs = np.array([
-            (odds * len(fit.effects) - count * math.log(max(self.error(fit), 1e-300)))
-            / self.settings.temper for fit in fits])
+            odds * len(fit.effects) - count * math.log(max(self.error(fit), 1e-300))
+            for fit in fits])
         weights = np.exp(logs - logs.max())
         return list(zip(fits, (weights / weights.sum()).tolist()))
 
@@ -170,9 +170,8 @@ def _alone(fitter, name):
 def _together(fitter, effects):
     """Fit and cross-validate some effects, from usual values and from those that each had."""
     with np.errstate(all='ignore'):
-        return _finite(fitter, lambda: min(
-            (fitter.fit(start) for start in (usual(effects, fitter.problem.kind), effects)),
-            key=lambda fit: fitter.error(fit.predicted)))
+        return _finite(fitter, lambda: fitter.best_of(
+            [usual(effects, fitter.problem.kind), effects]))
 
 
 def _finite(fitter, make):

@@ -18,7 +18,7 @@ import copy
 import dataclasses
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg
 
 # Bounds of the amplitudes against the discrepancy's size: as good as nothing, as good as all.
 WIDEST = 1e3
@@ -187,6 +187,7 @@ class Covariance:
         share = float(np.sqrt(np.mean(residual ** 2))) / self._scale
         starts = [self.start(0.1, share), self.start(share, 0.1)] if values is None else [
             np.clip(values, self._low, self._high)]
+        from scipy import optimize     # a third of a second that bench tables do not need
         with np.errstate(all='ignore'):
             found = [optimize.minimize(
                 self._cost, start, (residual,), jac=True, method='L-BFGS-B',

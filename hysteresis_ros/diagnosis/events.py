@@ -30,7 +30,7 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
     time : float or None
         Seconds since the first recording began; None for a recording that is too short.
     log_posterior : float
-        On the scale of `Selection.log_posterior`, over the settings' `temper`.
+        On the scale of `Selection.log_posterior`.
     """
     count = len(problem.measured)
     margin = max(2, int(MARGIN * count))
@@ -59,8 +59,8 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
             if evidence[index] > best:
                 best, moment = float(evidence[index]), rows[index]
     odds = math.log(selection.settings.prior / (1.0 - selection.settings.prior))
-    total = best + odds - math.log(len(rows) * len(shapes))
-    return float(problem.clock[moment]), total / selection.settings.temper
+    total = best / selection.settings.temper + odds - math.log(len(rows) * len(shapes))
+    return float(problem.clock[moment]), total
 
 
 def _explained(residual, columns) -> np.ndarray:

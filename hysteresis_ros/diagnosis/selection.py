@@ -225,7 +225,7 @@ class Selection:
     def log_posterior(self, names) -> float:
         """Return the logarithm of a set's posterior probability, but for a constant."""
         odds = math.log(self.settings.prior / (1.0 - self.settings.prior))
-        return self.fits[names].log_evidence + odds * len(names)
+        return self.fits[names].log_evidence / self.settings.temper + odds * len(names)
 
     def ranked(self) -> list[frozenset]:
         """Return all sets that were fitted, most probable first."""
@@ -292,8 +292,7 @@ class Selection:
     def _would_do(self, without, names) -> bool:
         """Whether a smaller set suffices and is not clearly less probable than the larger one."""
         odds = self.log_posterior(names) - self.log_posterior(without)
-        return self.sufficient(without) and (
-            odds / self.settings.temper < -math.log(self.settings.reported))
+        return self.sufficient(without) and odds < -math.log(self.settings.reported)
 
 
 def _subsets(names) -> list[frozenset]:

@@ -38,7 +38,7 @@ class Settings:
     residual_share : float
         Share of the first mean square that one effect may leave beyond the discrepancy.
     temper : float
-        By which log posteriors are divided before they are compared: neither the discrepancy's
+        By which log evidences are divided before they are compared: neither the discrepancy's
         covariance nor an effect's equation is exact, so that many rows do not say as much as they
         would of a true model (Miller and Dunson, J. Am. Stat. Assoc. 114 (2019) 1113).
     reported : float
@@ -57,6 +57,6 @@ class Settings:
     practical: float = 0.05
     form: float = 0.1
     residual_share: float = 0.08
-    temper: float = 2.0
+    temper: float = 8.0
     reported: float = 0.02
     draws: int = 400

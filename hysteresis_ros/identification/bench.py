@@ -265,7 +265,7 @@ def _better_of(length: Measurement, operators: Sequence[str],
         fit = one.length_fit
         if fit is None:
             return np.inf
-        return float(fit.validation.min()) if len(fit.validation) else fit.rmse
+        return fit.held_out_rmse if len(fit.validation) else fit.rmse
     return min(found, key=held_out)
 
 

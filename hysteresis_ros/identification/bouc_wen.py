@@ -10,14 +10,19 @@ projection, G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413), and on
 searched, from many starts, so that the result does not hang on one.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import optimize
 from scipy.special import psi
 
 from hysteresis_ros.identification.nonnegative import solve_nonnegative
 from hysteresis_ros.operators import BoucWen
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 # Pieces of S, and the least slope of each as a share of the mean one, so that it can be inverted.
 PIECES, LEAST_SLOPE = 8, 1e-3
@@ -138,8 +143,9 @@ class _Problem:
         error -= error.mean() + self.outputs
         return np.append(error / np.sqrt(len(x)), np.sqrt(SMOOTHNESS) * np.diff(slopes))
 
-    def refine(self, vector: np.ndarray) -> optimize.OptimizeResult:
+    def refine(self, vector: np.ndarray) -> OptimizeResult:
         """Return the result of scipy's search from a start."""
+        from scipy import optimize     # a third of a second that no other operator needs
         inside = np.clip(vector, LOWEST + 1e-6, HIGHEST - 1e-6)
         return optimize.least_squares(
             self.residual, inside, bounds=(LOWEST, HIGHEST), method='trf', diff_step=DIFFERENCE,

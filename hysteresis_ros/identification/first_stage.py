@@ -12,7 +12,6 @@ hysteresis.
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy import optimize
 
 from hysteresis_ros.identification.nonnegative import quick_weights
 from hysteresis_ros.identification.operators import preisach_rows, smoothness, thinned
@@ -130,6 +129,7 @@ def _between(means: np.ndarray, span: float) -> list:
 
 def _search(score: Callable, exponents: Sequence[float]) -> np.ndarray:
     """Return the best vector (log slope, exponent): a coarse grid, then a simplex from its best."""
+    from scipy import optimize     # a third of a second that a force table saves
     starts = [np.array([slope, exponent]) for exponent in exponents for slope in SLOPES]
     values = [score(start) for start in starts]
     best = starts[int(np.argmin(values))]

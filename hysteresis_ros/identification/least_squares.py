@@ -27,7 +27,7 @@ import functools
 from typing import Optional, Sequence
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg, sparse
 
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.nonnegative import quick_weights, solve_nonnegative
@@ -108,7 +108,7 @@ def fit_weights(
     strengths : sequence of float, optional
         Default `STRENGTHS`, 15 values over seven decades.
     slack : (float, float), optional
-        Only strengths are chosen whose RMSE over the rows of the fit is above that of the weakest
+        Only strengths are tried whose RMSE over the rows of the fit is above that of the weakest
         by at most the first share of P plus the second share of that RMSE; see `SLACK`. Default:
         no such limit.
     anchor : Anchor, optional
@@ -138,15 +138,12 @@ def fit_weights(
         raise IdentificationError('least squares: every strength must be a number above 0')
     if strength is not None:
         return problem.regularised(tried[0])
-    fitted, path = problem.fitted_errors(tried)
+    path = problem.path(tried, slack)
+    tried = tried[:len(path)]
     errors = problem.held_out_errors(tried, path)
     validation = np.sqrt(np.mean(errors ** 2, axis=1))
-    allowed = np.ones(len(tried), dtype=bool)
-    if slack is not None:
-        rmse = np.sqrt(np.mean(fitted ** 2, axis=1))
-        allowed = rmse <= rmse[0] + slack[0] + slack[1] * rmse[0]
-    best = int(np.argmin(np.where(allowed, validation, np.inf)))
-    return problem.regularised(tried[best], tried, validation, errors[best])
+    best = int(np.argmin(validation))
+    return problem.regularised(tried[best], tried, validation, errors[best], path[best])
 
 
 @dataclass(frozen=True)
@@ -214,6 +211,7 @@ class _Problem:
 
     def plain(self) -> WeightFit:
         """Solve the paper's problem: no penalty, bias as the difference of two columns."""
+        from scipy import optimize     # a third of a second that only the plain problem needs
         design, target = self._reduced
         design = np.column_stack([design, -design[:, -1]])
         try:
@@ -230,37 +228,47 @@ class _Problem:
         noise = float(np.sqrt(np.sum(errors ** 2) / freedom))
         return self._result(x, passive, covariance, noise, 0.0, np.zeros(0), np.zeros(0))
 
-    def fitted_errors(self, strengths: np.ndarray) -> tuple[np.ndarray, list]:
-        """Return the error of every row of the fit for ascending strengths (S, M), and the path."""
-        path = self._path(strengths, np.ones(len(self.target), dtype=bool))
-        return np.array([self.design @ x - self.target for x, _ in path]), path
+    @functools.cached_property
+    def _curvature(self) -> np.ndarray:
+        """Square of the penalty, whose root is mostly zeros."""
+        root = sparse.csr_matrix(self.penalty)
+        return (root.T @ root).toarray()
+
+    def path(self, strengths: np.ndarray,
+             slack: Optional[tuple] = None) -> list[tuple[np.ndarray, np.ndarray]]:
+        """
+        Return the fit to all rows for each of ascending strengths, up to the end of the slack.
+
+        The RMSE rises with the strength, so that no stronger one is allowed where one is not.
+        """
+        gram, moment = self._moments(np.ones(len(self.target), dtype=bool))
+        found: list[tuple[np.ndarray, np.ndarray]] = []
+        limit = np.inf
+        for strength in strengths:
+            x, passive = solve_nonnegative(gram + strength * self._curvature, moment, self.free,
+                                           found[-1][1] if found else None)
+            rmse = np.sqrt(np.mean((self.design @ x - self.target) ** 2))
+            if rmse > limit:
+                break
+            if not found and slack is not None:
+                limit = rmse + slack[0] + slack[1] * rmse
+            found.append((x, passive))
+        return found
 
     def held_out_errors(self, strengths: np.ndarray, path: list) -> np.ndarray:
         """
-        Return the error of every row, held out with its fold, for ascending strengths (S, M).
+        Return the error of every row, held out with its fold, for given strengths (S, M).
 
         `path` is that of the fit to all rows, near which those of the folds are.
         """
         errors = np.empty((len(strengths), len(self.target)))
         for held in self.folds:
-            for k, (x, _) in enumerate(self._path(strengths, ~held, path)):
+            gram, moment = self._moments(~held)
+            for k, strength in enumerate(strengths):
+                x, _ = solve_nonnegative(
+                    gram + strength * self._curvature, moment, self.free, path[k][1])
                 errors[k, held] = self.design[held] @ x - self.target[held]
         return errors
-
-    def _path(self, strengths: np.ndarray, rows: np.ndarray,
-              near: list | None = None) -> list[tuple[np.ndarray, np.ndarray]]:
-        """
-        Return solutions for some rows, each with its unknowns off their bound.
-
-        Each starts from its stronger neighbour's, or from the one of the same strength in `near`.
-        """
-        curvature, passive, path = self.penalty.T @ self.penalty, None, []
-        gram, moment = self._moments(rows)
-        for k in reversed(range(len(strengths))):
-            x, passive = solve_nonnegative(gram + strengths[k] * curvature, moment, self.free,
-                                           passive if near is None else near[k][1])
-            path.append((x, passive))
-        return path[::-1]
 
     def _moments(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the mean Gram matrix and the mean of design times target."""
@@ -269,14 +277,19 @@ class _Problem:
 
     def regularised(self, strength: float, strengths: Sequence[float] | np.ndarray = (),
                     validation: Sequence[float] | np.ndarray = (),
-                    held_out: np.ndarray | None = None) -> WeightFit:
-        """Fit all rows; `held_out` are errors of held-out rows, shape (M,), if there are any."""
-        gram, moment = self._moments(np.ones(len(self.target), dtype=bool))
-        gram += strength * self.penalty.T @ self.penalty
-        x, passive = solve_nonnegative(gram, moment, self.free)
+                    held_out: np.ndarray | None = None,
+                    solved: tuple[np.ndarray, np.ndarray] | None = None) -> WeightFit:
+        """
+        Fit all rows.
+
+        `held_out` (M,) are errors of held-out rows and `solved` is the entry of the path, if there
+        are any.
+        """
+        x, passive = solved or self.path(np.array([strength]))[0]
         x = self._polish(x, passive, strength)
-        covariance = linalg.inv(len(self.target) * gram[np.ix_(passive, passive)])
         block = self.design[:, passive]
+        covariance = linalg.inv(block.T @ block + len(self.target) * strength
+                                * self._curvature[np.ix_(passive, passive)])
         leverage = np.sum((block @ covariance) * block, axis=1)
         if held_out is not None:
             noise = float(np.sqrt(np.mean(held_out ** 2 / (1.0 + leverage))))

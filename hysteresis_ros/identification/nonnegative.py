@@ -8,9 +8,14 @@ import numpy as np
 from scipy.linalg import lapack
 
 from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.kernels.pivoting import pivot
 
 # Share of the largest gradient below which a sign is rounding.
 TOLERANCE = 1e-11
+# Share of the largest unknown below which a sign is rounding.
+ROUNDING = 1e-12
+SINGULAR = 1        # state of `pivot`
+NO_SOLUTION = 'least squares: the problem is singular; use a strength above 0'
 
 
 def solve_nonnegative(
@@ -45,33 +50,16 @@ def solve_nonnegative(
     IdentificationError
         When `gram` is not positive definite or no solution is found.
     """
-    size = len(moment)
     passive = free.copy() if start is None else (start | free)
-    fewest, tries = size + 1, 3
-    gradient_tolerance = TOLERANCE * max(float(np.max(np.abs(moment))), 1e-300)
-    for _ in range(20 * size):
-        index = np.flatnonzero(passive)
-        x = np.zeros(size)
-        if len(index):
-            x[index] = solve(gram[np.ix_(index, index)], moment[index])
-        gradient = gram @ x - moment
-        wrong = (passive & ~free & (x < -1e-12 * np.max(np.abs(x)))) | (
-            ~passive & (gradient < -gradient_tolerance))
-        count = int(np.count_nonzero(wrong))
-        if count == 0:
-            # The tolerance on signs is one of rounding: nothing below the bound is handed on.
-            return np.where(free, x, np.where(passive, np.maximum(x, 0.0), 0.0)), passive
-        if count < fewest:
-            fewest, tries = count, 3
-        elif tries > 0:
-            tries -= 1
-        else:
-            last = np.flatnonzero(wrong)[-1]
-            wrong = np.zeros(size, dtype=bool)
-            wrong[last] = True
-        passive = passive ^ wrong
-    raise IdentificationError(
-        'least squares: no solution found; use a larger strength or fewer levels')
+    x, state = pivot(gram, moment, free, passive,
+                     TOLERANCE * max(float(np.max(np.abs(moment))), 1e-300), ROUNDING)
+    if state == SINGULAR:
+        raise IdentificationError(NO_SOLUTION)
+    if state:
+        raise IdentificationError(
+            'least squares: no solution found; use a larger strength or fewer levels')
+    # The tolerance on signs is one of rounding: nothing below the bound is handed on.
+    return np.where(free | (x > 0.0), x, 0.0), passive
 
 
 def solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
@@ -79,8 +67,7 @@ def solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
     # LAPACK itself: for a problem this small the checks of scipy.linalg cost as much as its work.
     _, x, failed = lapack.dposv(gram, moment)
     if failed:
-        raise IdentificationError(
-            'least squares: the problem is singular; use a strength above 0')
+        raise IdentificationError(NO_SOLUTION)
     return x
 
 
