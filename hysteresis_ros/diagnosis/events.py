@@ -59,7 +59,7 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
             if evidence[index] > best:
                 best, moment = float(evidence[index]), rows[index]
     odds = math.log(selection.settings.prior / (1.0 - selection.settings.prior))
-    total = best / selection.settings.temper + odds - math.log(len(rows) * len(shapes))
+    total = best / selection.temper + odds - math.log(len(rows) * len(shapes))
     return float(problem.clock[moment]), total
 
 

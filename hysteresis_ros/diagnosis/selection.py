@@ -49,11 +49,15 @@ class Selection:
         The best full fit of each set.
     unobservable : dict of str to str
         Effects that this data cannot show, with the reason.
+    temper : float
+        What log evidences are divided by; see `Settings.coarsening`.
     """
 
     def __init__(self, problem, settings, rng, progress):
         self.problem, self.settings = problem, settings
         self.rng, self.progress = rng, progress
+        self._odds = math.log(settings.prior / (1.0 - settings.prior))
+        self.temper = 1.0 + len(problem.measured) / settings.coarsening
         self.names, self.unobservable = observable(problem)
         self.fixed = list(problem.model.effects)
         predicted = problem.simulate(self.fixed)
@@ -70,7 +74,8 @@ class Selection:
         self._grown: set[frozenset] = set()
         self._refined: set[frozenset] = set()
         self._least_errors: dict[frozenset, float] = {}
-        # With the response that each belongs to.
+        # Both with the response that they belong to.
+        self._linearised: dict[frozenset, tuple[np.ndarray, Linearised]] = {}
         self._errors: dict[frozenset, tuple[np.ndarray, float]] = {}
         self.limit = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised | None = None
@@ -88,7 +93,7 @@ class Selection:
             stage()
 
     def _score(self) -> None:
-        self.alone = self._beside(self.base)
+        self.alone = self._beside(frozenset())
 
     def _fit_alone(self) -> None:
         """Fit every effect by itself, from the start that scored best."""
@@ -122,12 +127,23 @@ class Selection:
         return family.p_values(self.base.point, self.rng, self.settings.draws)
 
     def _worth_growing(self) -> bool:
-        """Whether the best set leaves more than its equations could: larger ones are due."""
+        """Whether larger sets are due: the best leaves too much, or what it should not leave."""
         valid = self.valid()
         if not valid:
             return True
-        form = self.settings.form * self.structure(frozenset()) if valid[0] else 0.0
-        return self.structure(valid[0]) > math.hypot(self.limit, form)
+        best = next((names for names in valid if self.sufficient(names)), valid[0])
+        form = self.settings.form * self.structure(frozenset()) if best else 0.0
+        if self.structure(best) > math.hypot(self.limit, form):
+            return True
+        # What a further effect explains has to exceed the base model's own error.
+        return bool(best) and self.error(best) > self.covariance.size and self._promising(best)
+
+    def _promising(self, names) -> bool:
+        """Whether one more effect makes a set more probable, by linearisation."""
+        beside = self._beside(names)
+        alone, = beside.evidences(np.zeros((1, 0), dtype=int))
+        gain = max((value for value, _ in beside.singles().values()), default=-np.inf) - alone
+        return gain / self.temper > -self._odds
 
     def grow(self, names) -> None:
         """Fit the best sets of one more effect than those named."""
@@ -135,7 +151,7 @@ class Selection:
             return
         self._grown.add(names)
         fit = self.fits[names]
-        found = self._beside(fit).singles()
+        found = self._beside(names).singles()
         self._fit_best({key: (value, [
             *(one for one in fit.effects if one.id not in effects[0].replaces), *effects])
             for key, (value, effects) in found.items()})
@@ -158,15 +174,19 @@ class Selection:
         found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
         return self.fitter.refined(max(found, key=lambda one: one.log_evidence))
 
-    def _beside(self, fit) -> Linearised:
-        """Linearise all other effects beside those of a fit."""
-        taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
-        names = [name for name in self.names if name not in taken]
-        _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
-        return Linearised(
-            [fit.point] if fit.covariance else self.covariance.points,
-            self.problem.measured - fit.predicted,
-            starts_beside(self.fitter, fit, names), fit.jacobian * spread)
+    def _beside(self, names) -> Linearised:
+        """Linearise all other effects beside a set."""
+        fit = self.fits[names]
+        known = self._linearised.get(names)
+        if known is None or known[0] is not fit.predicted:
+            taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
+            others = [name for name in self.names if name not in taken]
+            _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
+            self._linearised[names] = known = (fit.predicted, Linearised(
+                [fit.point] if fit.covariance else self.covariance.points,
+                self.problem.measured - fit.predicted,
+                starts_beside(self.fitter, fit, others), fit.jacobian * spread))
+        return known[1]
 
     def _fit_best(self, scored) -> None:
         """Fit the best sets for a few steps, and the best of these to the end."""
@@ -224,8 +244,7 @@ class Selection:
 
     def log_posterior(self, names) -> float:
         """Return the logarithm of a set's posterior probability, but for a constant."""
-        odds = math.log(self.settings.prior / (1.0 - self.settings.prior))
-        return self.fits[names].log_evidence / self.settings.temper + odds * len(names)
+        return self.fits[names].log_evidence / self.temper + self._odds * len(names)
 
     def ranked(self) -> list[frozenset]:
         """Return all sets that were fitted, most probable first."""

@@ -37,10 +37,11 @@ class Settings:
         residual without a further one being looked for.
     residual_share : float
         Share of the first mean square that one effect may leave beyond the discrepancy.
-    temper : float
-        By which log evidences are divided before they are compared: neither the discrepancy's
-        covariance nor an effect's equation is exact, so that many rows do not say as much as they
-        would of a true model (Miller and Dunson, J. Am. Stat. Assoc. 114 (2019) 1113).
+    coarsening : float
+        Rows that many rows are worth: neither the discrepancy's covariance nor an effect's equation
+        is exact, so that n rows say what n / (1 + n / coarsening) of a true model would, and log
+        evidences are divided by 1 + n / coarsening before they are compared (Miller and Dunson,
+        J. Am. Stat. Assoc. 114 (2019) 1113).
     reported : float
         Sets less likely than this are not reported as alternatives.
     draws : int
@@ -57,6 +58,6 @@ class Settings:
     practical: float = 0.05
     form: float = 0.1
     residual_share: float = 0.08
-    temper: float = 8.0
+    coarsening: float = 40.0
     reported: float = 0.02
     draws: int = 400
