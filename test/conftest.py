@@ -20,6 +20,10 @@ SLOW = ('test_bench_diagnosis', 'test_demo', 'test_diagnose', 'test_readme', 'te
 # Tests of other runs on the same network must not be heard; rclpy reads this at its start.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
+# Suites run side by side; threads of BLAS that wait for each other would take most of their time.
+# Commands that the tests start see to that themselves.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
 # Slow machines are no failures, and every run tries the same examples.
 hypothesis.settings.register_profile('suite', deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile('suite')
