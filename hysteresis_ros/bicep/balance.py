@@ -11,13 +11,14 @@ rest.
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.bicep.geometry import BicepGeometry
-from hysteresis_ros.bicep.wires import kernels_for, wires_of
+from hysteresis_ros.bicep.wires import kernels_for, wires_of, with_own_memories
 from hysteresis_ros.effects.stages import Statics
 from hysteresis_ros.kernels import trial
 from hysteresis_ros.kernels.arm import Arm, MOTION, State
@@ -93,6 +94,13 @@ class ArmBalance:
         self._state = State(memories, np.empty(MOTION), np.empty(len(self.operators)))
         self._kernels = kernels_for(operator, trial)
         self.start()
+
+    def copy(self) -> ArmBalance:
+        """Return the same arm with a state of its own."""
+        other = copy.copy(self)
+        other.operators, memories = with_own_memories(self.operators)
+        other._state = State(memories, self._state.motion.copy(), self._state.inputs.copy())
+        return other
 
     def start(self) -> None:
         """Wipe the memory: after a full heat and cool cycle, before the first sample."""

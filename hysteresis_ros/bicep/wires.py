@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The muscles that pull on one clamp, as kernels want them: tables and memories."""
 
+from collections.abc import Sequence
 import copy
 import types
 from typing import Any
@@ -48,19 +49,36 @@ def wires_of(operator: HysteresisOperator, offsets: tuple[float, ...], complianc
         # Of other operators the wires are elastic only beyond what H2 can give.
         inside = compliance
         operator = operator.tilted(inside)
-    operators: list[HysteresisOperator]
-    table: Any = None
-    memories: Any
-    if isinstance(operator, CompiledOperator):
-        muscles = [copy.deepcopy(operator) for _ in offsets]
-        table, memories = operator.table, np.empty((len(offsets), len(operator.memory)))
-        for row, muscle in zip(memories, muscles):
-            muscle.move_memory(row)
-        operators = [*muscles]
-    else:
-        operators = memories = [copy.deepcopy(operator) for _ in offsets]
+    table = operator.table if isinstance(operator, CompiledOperator) else None
+    operators, memories = with_own_memories([operator] * len(offsets))
     return (Wires(table, np.array(offsets, dtype=float), float(compliance), inside, middle,
                   tolerance), operators, memories)
+
+
+def with_own_memories(operators: Sequence[HysteresisOperator]
+                      ) -> tuple[list[HysteresisOperator], Any]:
+    """
+    Return copies of operators, and their memories as kernels take them.
+
+    Parameters
+    ----------
+    operators : sequence of HysteresisOperator
+        All of one kind.
+
+    Returns
+    -------
+    operators : list of HysteresisOperator
+    memories : ndarray, shape (operators, entries)
+        Rows that the copies read and write; of operators that are not compiled the copies.
+    """
+    copies = [copy.deepcopy(operator) for operator in operators]
+    compiled = [operator for operator in copies if isinstance(operator, CompiledOperator)]
+    if not compiled:
+        return copies, copies
+    memories = np.empty((len(compiled), len(compiled[0].memory)))
+    for row, operator in zip(memories, compiled):
+        operator.move_memory(row)
+    return copies, memories
 
 
 def kernels_for(operator: HysteresisOperator, module: types.ModuleType) -> Any:

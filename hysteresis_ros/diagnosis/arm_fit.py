@@ -18,7 +18,7 @@ from hysteresis_ros.diagnosis.parameters import ParameterVector
 # Simulated responses are smooth only on this scale of the parameters' units.
 DIFFERENCE = 0.02
 MOST_STEPS = 12
-# What the damping is divided by after a step that was good, and multiplied by after one that was not.
+# What the damping is divided by after a good step, and multiplied by after a bad one.
 EASIER, HARDER = 10.0, 30.0
 FIRST_DAMPING, MOST_DAMPING = 1e-2, 1e3
 # A step that gains less than this in the log posterior ends the fit.

@@ -5,11 +5,11 @@ Discrepancy of the base model: how wrong it is by itself, as a covariance of an 
 
 Two parts are known before the arm moves. The bench says how large the error of the length is, on
 trials or loads that were held out; on the arm it shows as an error of the angle that is alike at
-neighbouring drives and responses and differs between the directions of the drive. And the bench holds the load
-still, while an arm's load moves with the wire: what a load does in the middle of a transformation
-the bench cannot tell. Two models that agree on every bench table bound it: the load acts inside
-the operator and leaves its mark in the memory, or the muscle is at each moment as if its present
-load had acted all along. Their difference is the second part (`path_difference`).
+neighbouring drives and responses and differs between the directions of the drive. And the bench
+holds the load still, while an arm's load moves with the wire: what a load does in the middle of a
+transformation the bench cannot tell. Two models that agree on every bench table bound it: the load
+acts inside the operator and leaves its mark in the memory, or the muscle is at each moment as if
+its present load had acted all along. Their difference is the second part (`path_difference`).
 """
 
 import numpy as np

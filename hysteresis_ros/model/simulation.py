@@ -30,6 +30,8 @@ HOLD = 30.0
 PHASE_PASSES, AGREEMENT, SHORTEST = 10, 2e-3, 0.2
 # The same for an arm in motion, which has many more rows.
 MOVING_PASSES = 4
+# Balances that are kept, each with a table of some thousand numbers.
+MOST_BALANCES = 64
 
 
 @dataclasses.dataclass
@@ -123,6 +125,7 @@ class Simulator:
         self.measurement = measurement
         self.trials = trials_of(model, measurement)
         self._surroundings = model.surroundings
+        self._balances: dict[tuple, ArmBalance] = {}
         self._statics = None
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
@@ -224,10 +227,23 @@ class Simulator:
             return lambda trial, inputs: self._force(chain, operator, trial, inputs)
         first = self.model.first_stage(chain)
         if response == 'angle':
-            balance = self.model.balance(chain, self._statics)
+            balance = self._balance(chain)
             return lambda trial, inputs: self._angle(chain, first, balance, trial, inputs)
         stage = self.model.require_length_stage()
         return lambda trial, inputs: self._length(chain, first, stage, trial, inputs)
+
+    def _balance(self, chain: Chain) -> ArmBalance:
+        """Return the balance of an arm; most sets of effects differ in what it does not see."""
+        key = tuple((effect.id, *effect.values.values())
+                    for effect in (*chain.material, *chain.mechanism))
+        made = self._balances.get(key)
+        if made is None:
+            made = self.model.balance(chain, self._statics)
+            if len(self._balances) >= MOST_BALANCES:
+                self._balances.clear()
+            self._balances[key] = made
+        # Each thread has a state of its own.
+        return made.copy()
 
     def _first(self, chain: Chain, first: FirstStage, trial: Trial, inputs: Inputs
                ) -> tuple[float, np.ndarray, np.ndarray]:
