@@ -2,27 +2,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects that belong to the bench model: found in its own tables, or named by the user."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.extend import extended_model
-from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, measure
 
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.workers import Progress
 
-def _silent(iterable, total):
-    return iterable
+
+def _silent(items: Iterable, total: int) -> Iterable:
+    return items
 
 
-def add_effects(model, length, force=None, names=None, length_trials=None, force_trials=None,
-                jobs: int = 1, progress=_silent):
+def add_effects(model: MuscleModel, length: Measurement, force: Measurement | None = None,
+                names: Sequence[str] | None = None, length_trials: Sequence[float] | None = None,
+                force_trials: Sequence[float] | None = None, jobs: int = 1,
+                progress: Progress = _silent) -> tuple[MuscleModel, list[Effect]]:
     """
     Add effects to an identified model and refit H2's weights with them.
 
@@ -40,7 +51,7 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
     jobs : int
         Processes.
     progress : callable
-        ``progress(iterable, total)``, for a progress bar.
+        ``progress(items, total)``, for a progress bar.
 
     Returns
     -------
@@ -70,7 +81,7 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
     return dataclasses.replace(extended, metrics=metrics), added
 
 
-def _with_universal(model, found, fitted):
+def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measurement) -> list[str]:
     """
     Name the effects found, and those that every loaded muscle has where they do no harm.
 
@@ -78,7 +89,7 @@ def _with_universal(model, found, fitted):
     and few rows may not prove either; but on an arm the load moves while the wire does. What is
     known beforehand needs no proof against chance, only held-out rows that do not speak against it.
     """
-    fitter = BenchFitter(problem_for(model, [fitted]))
+    fitter = BenchFitter(BenchProblem(model, [fitted]))
     names = [effect.id for effect in found]
     rest = usual([kind(model.surroundings) for name, kind in catalogue().items()
                   if kind.universal and name not in names and kind.available(model.surroundings)],
@@ -86,7 +97,7 @@ def _with_universal(model, found, fitted):
     if not rest:
         return names
 
-    def held_out(effects):
+    def held_out(effects: Sequence[Effect]) -> float:
         fit = fitter.fit(effects)
         if fit.implausible():
             return np.inf

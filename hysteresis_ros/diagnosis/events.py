@@ -2,17 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Something that happened once and lasts: a step of the response at an unknown moment."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.discrepancy import sensitivity
 
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.selection import Selection
+
 # On each side of the moment at least this share of the rows is needed.
 MARGIN = 0.06
 
 
-def most_probable(problem, selection) -> tuple[float | None, float]:
+def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | None, float]:
     """
     Return when something may have happened, and how probable that is beside the sets of effects.
 
@@ -22,7 +29,7 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
 
     Parameters
     ----------
-    problem : Problem
+    problem : ArmProblem
     selection : Selection
 
     Returns
@@ -63,6 +70,6 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
     return float(problem.clock[moment]), total
 
 
-def _explained(residual, columns) -> np.ndarray:
+def _explained(residual: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Return by how much each column (n, m) lowers the mean square of a residual, shape (m,)."""
     return (columns.T @ residual) ** 2 / np.sum(columns ** 2, axis=0) / len(residual)

@@ -8,14 +8,22 @@ of an effect, and of two whose responses add up, is a small linear algebra probl
 covariance at hand (MacKay, Information Theory, ch. 28). It says which sets are worth a full fit.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 import dataclasses
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
+    from hysteresis_ros.diagnosis.covariance import Point
 
 # Starts of an effect from which pairs are made.
 PAIRED_STARTS = 3
@@ -37,7 +45,7 @@ class Start:
         Derivatives in units of the prior's standard deviation.
     """
 
-    effect: object
+    effect: Effect
     change: np.ndarray
     columns: np.ndarray
 
@@ -47,7 +55,7 @@ class Start:
         return self.effect.id
 
 
-def starts_beside(fitter, fit, names) -> list[Start]:
+def starts_beside(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[Start]:
     """
     Linearise effects at all their starts, with the effects of a fit in place.
 
@@ -76,25 +84,26 @@ def starts_beside(fitter, fit, names) -> list[Start]:
     walks = [_Moves(start, fit.effects, problem.kind) for start in starts]
     responses = iter(fitter.simulate([effects for walk in walks for effects in walk.sets]))
     for walk in walks:
-        own = np.stack([next(responses) for _ in walk.sets])
-        if not np.all(np.isfinite(own)):
+        given = np.stack([next(responses) for _ in walk.sets])
+        if not np.all(np.isfinite(given)):
             continue
-        jacobian = (own[1:] - own[0]).T / np.array(walk.steps)
+        jacobian = (given[1:] - given[0]).T / np.array(walk.steps)
         mean, spread = walk.parameters.prior()
-        found.append(Start(walk.start, own[0] - fit.predicted + jacobian @ (mean - walk.vector),
-                           jacobian * spread))
+        found.append(Start(walk.start, given[0] - fit.predicted + jacobian @ (
+            mean - walk.vector), jacobian * spread))
     return found
 
 
 class _Moves:
     """The sets to simulate for the derivatives of one effect at a start."""
 
-    def __init__(self, start, others, kind):
+    def __init__(self, start: Effect, others: Sequence[Effect], kind: str) -> None:
         others = [effect for effect in others if effect.id not in start.replaces]
         self.start = start
         self.parameters = ParameterVector([start], kind)
         self.vector = self.parameters.vector()
-        self.sets, self.steps = [[*others, start]], []
+        self.sets: list[list[Effect]] = [[*others, start]]
+        self.steps: list[float] = []
         for index, value in enumerate(self.vector):
             step = 0.02 if value + 0.02 < self.parameters.upper[index] else -0.02
             moved = self.vector.copy()
@@ -119,7 +128,8 @@ class Linearised:
         estimated anew with whatever is added.
     """
 
-    def __init__(self, points, residual, starts, nuisance=None):
+    def __init__(self, points: Sequence[Point], residual: np.ndarray, starts: Sequence[Start],
+                 nuisance: np.ndarray | None = None) -> None:
         self.starts = starts
         count = len(residual)
         nuisance = np.zeros((count, 0)) if nuisance is None else nuisance
@@ -135,7 +145,7 @@ class Linearised:
             whitened = point.whiten(self._columns)
             self._grams.append(whitened.T @ whitened)
 
-    def _places(self, chosen):
+    def _places(self, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the columns' places of `chosen` (m, s) starts: derivatives (m, k), changes."""
         chosen = np.asarray(chosen)
         first = 1 + len(self.starts)
@@ -145,13 +155,13 @@ class Linearised:
         changes = np.concatenate([np.zeros((len(chosen), 1), dtype=int), 1 + chosen], axis=1)
         return np.concatenate([fixed, derivatives], axis=1), changes
 
-    def evidences(self, chosen) -> np.ndarray:
+    def evidences(self, chosen: np.ndarray) -> np.ndarray:
         """
         Return the log evidences of sets of starts, the largest over the covariances.
 
         Parameters
         ----------
-        chosen : sequence of sequence of int, shape (m, s)
+        chosen : ndarray of int, shape (m, s)
             Indices of the starts of each set, all sets of one size.
 
         Returns
@@ -178,37 +188,37 @@ class Linearised:
             best = np.maximum(best, evidence)
         return best
 
-    def singles(self) -> dict[tuple, tuple[float, list]]:
+    def singles(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
         """Return for each effect the best evidence and the start that reaches it."""
         values = self.evidences(np.arange(len(self.starts))[:, None])
-        found: dict[tuple, tuple[float, list]] = {}
+        found: dict[tuple[str, ...], tuple[float, list[Effect]]] = {}
         for start, value in zip(self.starts, values):
             if (start.id,) not in found or value > found[start.id,][0]:
                 found[start.id,] = (float(value), [start.effect])
         return found
 
-    def pairs(self) -> dict[tuple, tuple[float, list]]:
+    def pairs(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
         """Return the same for pairs of effects, from the best few starts of each."""
         alone = self.evidences(np.arange(len(self.starts))[:, None])
-        kept: dict[str, list] = {}
+        kept: dict[str, list[int]] = {}
         for index in np.argsort(-alone, kind='stable'):
             own = kept.setdefault(self.starts[index].id, [])
             if len(own) < PAIRED_STARTS:
                 own.append(int(index))
-        chosen = []
+        chosen: list[tuple[int, int]] = []
         for one, other in itertools.combinations(kept, 2):
             first, second = (self.starts[kept[name][0]].effect for name in (one, other))
             if other not in first.replaces and one not in second.replaces:
                 chosen += itertools.product(kept[one], kept[other])
-        found: dict[tuple, tuple[float, list]] = {}
-        for (one, other), value in zip(chosen, self.evidences(np.array(chosen).reshape(-1, 2))):
-            effects = [self.starts[index].effect for index in (one, other)]
+        found: dict[tuple[str, ...], tuple[float, list[Effect]]] = {}
+        for indices, value in zip(chosen, self.evidences(np.array(chosen).reshape(-1, 2))):
+            effects = [self.starts[index].effect for index in indices]
             names = tuple(sorted(effect.id for effect in effects))
             if names not in found or value > found[names][0]:
                 found[names] = (float(value), effects)
         return found
 
-    def p_values(self, point, rng, count: int) -> dict[str, float]:
+    def p_values(self, point: Point, rng: np.random.Generator, count: int) -> dict[str, float]:
         """
         Return family-wise p values of single effects.
 

@@ -9,16 +9,26 @@ the best, until none of the most probable sets has not been grown from. What is 
 are full fits.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
-from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.covariance import Covariance, Point
 from hysteresis_ros.diagnosis.discrepancy import covariance
 from hysteresis_ros.diagnosis.linearised import Linearised, Start, starts_beside
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.effects import Effect
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.settings import Settings
+    from hysteresis_ros.workers import Progress
 
 # Drift and noise of the first covariances, as shares of the discrepancy.
 FIRST_POINTS = ((0.1, 0.05), (0.4, 0.3), (1.5, 0.3), (6.0, 0.3))
@@ -39,7 +49,7 @@ class Selection:
     settings : Settings
     rng : numpy.random.Generator
     progress : callable
-        ``progress(iterable, total)``, for a progress bar.
+        ``progress(items, total)``, for a progress bar.
 
     Attributes
     ----------
@@ -53,7 +63,8 @@ class Selection:
         What log evidences are divided by; see `Settings.coarsening`.
     """
 
-    def __init__(self, problem, settings, rng, progress):
+    def __init__(self, problem: ArmProblem, settings: Settings, rng: np.random.Generator,
+                 progress: Progress) -> None:
         self.problem, self.settings = problem, settings
         self.rng, self.progress = rng, progress
         self._odds = math.log(settings.prior / (1.0 - settings.prior))
@@ -70,18 +81,18 @@ class Selection:
         self.covariance.add(self.covariance.fit(problem.measured - predicted))
         self.base = self.fitter.judge(
             Fit([], np.zeros(0), predicted, np.zeros((len(predicted), 0))))
-        self.fits: dict[frozenset, Fit] = {frozenset(): self.base}
-        self._grown: set[frozenset] = set()
-        self._refined: set[frozenset] = set()
-        self._least_errors: dict[frozenset, float] = {}
+        self.fits: dict[frozenset[str], Fit] = {frozenset(): self.base}
+        self._grown: set[frozenset[str]] = set()
+        self._refined: set[frozenset[str]] = set()
+        self._least_errors: dict[frozenset[str], float] = {}
         # Both with the response that they belong to.
-        self._linearised: dict[frozenset, tuple[np.ndarray, Linearised]] = {}
-        self._errors: dict[frozenset, tuple[np.ndarray, float]] = {}
+        self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
+        self._errors: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self.limit = self.covariance.largest_error(rng, settings.draws)
-        self.alone: Linearised | None = None
+        self.alone: Linearised
         self.p_values: dict[str, float] = {}
 
-    def _discrepancy(self, fit) -> np.ndarray:
+    def _discrepancy(self, fit: Fit) -> np.ndarray:
         """Return the discrepancy (n, n) of the base model where the arm goes with a fit."""
         effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
         return covariance(self.problem, effects, fit.predicted, self.settings)
@@ -124,7 +135,7 @@ class Selection:
                 fitted.append(Start(fit.effects[0], change, fit.jacobian * spread))
         family = Linearised(self.covariance.points, self.problem.measured - self.base.predicted,
                             [*self.alone.starts, *fitted])
-        return family.p_values(self.base.point, self.rng, self.settings.draws)
+        return family.p_values(self.base.require_point(), self.rng, self.settings.draws)
 
     def _worth_growing(self) -> bool:
         """Whether larger sets are due: the best leaves too much, or what it should not leave."""
@@ -138,14 +149,14 @@ class Selection:
         # What a further effect explains has to exceed the base model's own error.
         return bool(best) and self.error(best) > self.covariance.size and self._promising(best)
 
-    def _promising(self, names) -> bool:
+    def _promising(self, names: frozenset[str]) -> bool:
         """Whether one more effect makes a set more probable, by linearisation."""
         beside = self._beside(names)
         alone, = beside.evidences(np.zeros((1, 0), dtype=int))
         gain = max((value for value, _ in beside.singles().values()), default=-np.inf) - alone
         return gain / self.temper > -self._odds
 
-    def grow(self, names) -> None:
+    def grow(self, names: frozenset[str]) -> None:
         """Fit the best sets of one more effect than those named."""
         if names in self._grown:
             return
@@ -156,7 +167,7 @@ class Selection:
             *(one for one in fit.effects if one.id not in effects[0].replaces), *effects])
             for key, (value, effects) in found.items()})
 
-    def add(self, fit, effect) -> Fit:
+    def add(self, fit: Fit, effect: Effect) -> Fit:
         """
         Return the best fit of one more effect together with those of a fit.
 
@@ -174,7 +185,7 @@ class Selection:
         found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
         return self.fitter.refined(max(found, key=lambda one: one.log_evidence))
 
-    def _beside(self, names) -> Linearised:
+    def _beside(self, names: frozenset[str]) -> Linearised:
         """Linearise all other effects beside a set."""
         fit = self.fits[names]
         known = self._linearised.get(names)
@@ -183,12 +194,12 @@ class Selection:
             others = [name for name in self.names if name not in taken]
             _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
             self._linearised[names] = known = (fit.predicted, Linearised(
-                [fit.point] if fit.covariance else self.covariance.points,
+                [fit.require_point()] if fit.covariance else self.covariance.points,
                 self.problem.measured - fit.predicted,
                 starts_beside(self.fitter, fit, others), fit.jacobian * spread))
         return known[1]
 
-    def _fit_best(self, scored) -> None:
+    def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
         """Fit the best sets for a few steps, and the best of these to the end."""
         order = sorted(scored.values(), key=lambda item: -item[0])
         begun = self.fitter.fit(
@@ -197,21 +208,21 @@ class Selection:
         begun.sort(key=lambda fit: -fit.log_evidence)
         self._fit([fit.effects for fit in begun[:self.settings.refits]])
 
-    def _fit(self, sets) -> None:
+    def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
         for fit in self.fitter.fit(sets, self._metric()):
             self._keep(self.fitter.along(fit))
 
-    def _metric(self):
+    def _metric(self) -> Point:
         """Return the covariance in whose units fits are made: the expected discrepancy's."""
         return self.covariance.points[1]
 
-    def _keep(self, fit) -> None:
+    def _keep(self, fit: Fit) -> None:
         names = frozenset(fit.names)
         if names not in self.fits or fit.log_evidence > self.fits[names].log_evidence:
             self.fits[names] = fit
 
-    def _refine(self, size) -> None:
+    def _refine(self, size: int) -> None:
         """Give the most probable sets of a size covariances of their own, then judge all anew."""
         for _ in range(self.settings.refits):
             found = [names for names in self._ranked_of(size) if names not in self._refined]
@@ -239,18 +250,18 @@ class Selection:
             self._fit([[effect for effect in self.fits[one].effects if effect.id in names]
                        for names in missing for one in valid if names < one][:len(missing)])
 
-    def _ranked_of(self, size) -> list[frozenset]:
+    def _ranked_of(self, size: int) -> list[frozenset[str]]:
         return [names for names in self.ranked() if len(names) == size][:self.settings.beam]
 
-    def log_posterior(self, names) -> float:
+    def log_posterior(self, names: frozenset[str]) -> float:
         """Return the logarithm of a set's posterior probability, but for a constant."""
         return self.fits[names].log_evidence / self.temper + self._odds * len(names)
 
-    def ranked(self) -> list[frozenset]:
+    def ranked(self) -> list[frozenset[str]]:
         """Return all sets that were fitted, most probable first."""
         return sorted(self.fits, key=lambda names: -self.log_posterior(names))
 
-    def error(self, names) -> float:
+    def error(self, names: frozenset[str]) -> float:
         """Return the RMSE of a set on all judged rows, fitted by least squares."""
         fit = self.fits[names]
         known = self._errors.get(names)
@@ -261,18 +272,18 @@ class Selection:
             self._errors[names] = known = (fit.predicted, found)
         return known[1]
 
-    def structure(self, names) -> float:
+    def structure(self, names: frozenset[str]) -> float:
         """Return the root mean square of a set's residual without white noise."""
-        noise = self.fits[names].point.noise
+        noise = self.fits[names].require_point().noise
         return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
 
-    def sufficient(self, names) -> bool:
+    def sufficient(self, names: frozenset[str]) -> bool:
         """Whether a set leaves no more than the base model's own error could be."""
         share = self.settings.residual_share / max(len(names), 1)
         allowed = self.limit ** 2 + share * self.structure(frozenset()) ** 2
         return self.structure(names) ** 2 <= allowed
 
-    def valid(self) -> list[frozenset]:
+    def valid(self) -> list[frozenset[str]]:
         """
         Return the sets that may be the answer, most probable first.
 
@@ -285,10 +296,10 @@ class Selection:
         """
         physical = [names for names in self.ranked() if not self.fits[names].implausible()]
         return [names for names in physical if self._each_matters(names)
-                and (len(names) != 1 or self.p_values.get(*names, 1.0) <= SIGNIFICANCE)
+                and (len(names) != 1 or self.p_values.get(next(iter(names)), 1.0) <= SIGNIFICANCE)
                 and not self._surpassed(names, physical)]
 
-    def _each_matters(self, names) -> bool:
+    def _each_matters(self, names: frozenset[str]) -> bool:
         error = self.error(names)
         for without in _subsets(names):
             if without not in self.fits:
@@ -301,19 +312,19 @@ class Selection:
                 return False
         return True
 
-    def _surpassed(self, names, others) -> bool:
+    def _surpassed(self, names: frozenset[str], others: Iterable[frozenset[str]]) -> bool:
         """Whether another set of as few effects predicts far better."""
         form = self.settings.form * self.error(frozenset())
         least = self.error(names) ** 2 - self.covariance.size ** 2 - form ** 2
         return least > 0.0 and any(self.error(other) ** 2 < least for other in others
                                    if 0 < len(other) <= len(names))
 
-    def _would_do(self, without, names) -> bool:
+    def _would_do(self, without: frozenset[str], names: frozenset[str]) -> bool:
         """Whether a smaller set suffices and is not clearly less probable than the larger one."""
         odds = self.log_posterior(names) - self.log_posterior(without)
         return self.sufficient(without) and odds < -math.log(self.settings.reported)
 
 
-def _subsets(names) -> list[frozenset]:
+def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
     """Return the sets that lack one of the effects named."""
     return [names - {name} for name in names]

@@ -16,7 +16,7 @@ def block_sums(values: np.ndarray, block: np.ndarray) -> np.ndarray:
     return np.bincount(block, weights=values)
 
 
-def paired_p_values(gains: np.ndarray, rng, count: int = DRAWS) -> np.ndarray:
+def paired_p_values(gains: np.ndarray, rng: np.random.Generator, count: int = DRAWS) -> np.ndarray:
     """
     Family-wise p values from gains by block, by flipping the signs of whole blocks.
 
@@ -31,7 +31,7 @@ def paired_p_values(gains: np.ndarray, rng, count: int = DRAWS) -> np.ndarray:
     -------
     ndarray, shape (c,)
     """
-    def statistic(values):
+    def statistic(values: np.ndarray) -> np.ndarray:
         spread = np.std(values, axis=-1) + 1e-300
         return np.mean(values, axis=-1) / spread
 
@@ -41,8 +41,9 @@ def paired_p_values(gains: np.ndarray, rng, count: int = DRAWS) -> np.ndarray:
     return (1.0 + np.sum(best[None, :] >= observed[:, None], axis=1)) / (1.0 + count)
 
 
-def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray, rng,
-                  level: float = 0.95, count: int = DRAWS) -> tuple[float, float]:
+def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
+                  rng: np.random.Generator, level: float = 0.95, count: int = DRAWS
+                  ) -> tuple[float, float]:
     """
     Interval of the relative reduction of the RMSE, by a bootstrap over blocks.
 
