@@ -169,7 +169,7 @@ class Fitter:
         self.simulations = 0
 
     def simulate(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
-        """Return the responses (len(sets), n) with sets of effects beside the model's own."""
+        """Return the responses (len(sets), n) with sets of effects added to the model's own."""
         self.simulations += len(sets)
         with np.errstate(all='ignore'):
             return self.problem.simulate_many(
@@ -291,7 +291,7 @@ class Fitter:
             fit, covariance=own, judged=0, log_evidence=-np.inf))
 
     def refined(self, fit: Fit) -> Fit:
-        """Fit the covariance to what a fit leaves, then the effects under it once more."""
+        """Fit the covariance to the residual of a fit, then the effects under it once more."""
         own = fit.covariance or self.covariance
         values = own.fit(self.problem.measured - fit.predicted, fit.require_point().values)
         self.covariance.add(values)

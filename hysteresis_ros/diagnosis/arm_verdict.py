@@ -64,7 +64,7 @@ class _Verdict:
         self.settings = selection.settings
 
     def sum_up(self) -> verdict.Diagnosis:
-        """Judge what is left, and put all together."""
+        """Judge the residual, and put all together."""
         selection, problem = self.selection, self.problem
         valid = selection.valid()
         event, event_log = events.most_probable(problem, selection)
@@ -154,7 +154,7 @@ class _Verdict:
     def _unexplained(self, chosen: frozenset[str]) -> float:
         """Share of the first mean square that neither set nor base model nor noise explains."""
         selection = self.selection
-        beyond = selection.structure(chosen) ** 2 - selection.limit ** 2
+        beyond = selection.noise_free_rmse(chosen) ** 2 - selection.rmse_95 ** 2
         first = selection.error(frozenset()) ** 2
         return float(np.clip(beyond / max(first, 1e-300), 0.0, 1.0))
 
@@ -204,7 +204,7 @@ class _Verdict:
         sizes = np.sqrt(np.mean(changes ** 2, axis=1))
         return {name: 'even a strong one would change less than the noise'
                 for name, size in zip(selection.names, sizes)
-                if np.isfinite(size) and size < LEAST_CHANGE * selection.limit}
+                if np.isfinite(size) and size < LEAST_CHANGE * selection.rmse_95}
 
     def _ranking(self, missing: Sequence[str], before: float) -> list[dict[str, Any]]:
         selection, problem = self.selection, self.problem

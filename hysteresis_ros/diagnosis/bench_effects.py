@@ -75,7 +75,7 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
         return model, []
     extended, added = extended_model(model, names, [fitted])
     metrics = measure(extended, force, force_trials, length, length_trials)
-    # What was left out of the last fit of the weights stays beside the new errors.
+    # The errors of loads left out of the last fit of the weights stay with the new ones.
     for name, entry in metrics.items():
         metrics[name] = {**extended.metrics.get(name, {}), **entry}
     return dataclasses.replace(extended, metrics=metrics), added
@@ -103,10 +103,10 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
             return np.inf
         return fitter.error(fitter.cross_validate(fit).held_out)
 
-    # Alone they have to help; beside one that was found they only must not harm.
+    # Alone they have to help; together with one that was found they only must not harm.
     practical = Settings().practical
-    limit = held_out(found) * ((1.0 + practical) if names else (1.0 - practical))
+    largest = held_out(found) * ((1.0 + practical) if names else (1.0 - practical))
     for more in (rest, *([effect] for effect in rest)):
-        if held_out([*found, *more]) <= limit:
+        if held_out([*found, *more]) <= largest:
             return [*names, *(effect.id for effect in more)]
     return names

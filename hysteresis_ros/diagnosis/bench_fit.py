@@ -135,7 +135,7 @@ class BenchFitter:
         effects : sequence of Effect
             Effects to fit; their values are the start.
         evaluations : int
-            Responses that the optimiser looks at, at most.
+            Responses that the optimiser evaluates, at most.
         tolerance : float
             A step that lowers the sum of squares by a smaller share is the last.
         """
@@ -150,13 +150,13 @@ class BenchFitter:
         Parameters
         ----------
         known : sequence of Effect
-            Effects found before, fitted again beside the new one.
+            Effects found before, fitted again together with the new one.
         effect : Effect
             The new one.
         """
         starts = starts_of(effect, self.problem.kind, self.problem.measured)
-        kept = [*unaffected(self.fixed, [*known, starts[0]]), *known]
-        errors = [self.error(self.problem.simulate([*kept, start])) ** 2 for start in starts]
+        others = [*unaffected(self.fixed, [*known, starts[0]]), *known]
+        errors = [self.error(self.problem.simulate([*others, start])) ** 2 for start in starts]
         # Starts without any effect, such as stops out of reach, all have the same error.
         spread = max(float(np.var(self.problem.measured)), 1e-300)
         _, order = np.unique(np.round(np.array(errors) / spread, SAME), return_index=True)

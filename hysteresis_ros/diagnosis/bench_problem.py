@@ -303,7 +303,7 @@ class BenchProblem(Problem):
 
     def solve(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> Solution:
         """
-        Fit H2's weights beside effects.
+        Fit H2's weights with effects as they are.
 
         Parameters
         ----------

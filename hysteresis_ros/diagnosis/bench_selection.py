@@ -94,9 +94,9 @@ class BenchSelection:
         if not self.sets:
             return
         best = min(map(self.error, self.sets))
-        enough = [fit for fit in self.sets
-                  if self.error(fit) <= (1.0 + self.settings.practical) * best]
-        self.found = min(enough, key=lambda fit: (
+        near_best = [fit for fit in self.sets
+                     if self.error(fit) <= (1.0 + self.settings.practical) * best]
+        self.found = min(near_best, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.error(fit)))
 
     def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None],

@@ -147,9 +147,10 @@ def path_difference(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarra
         loads = np.linspace(np.min(ends), np.max(ends) + 1e-9 * (1.0 + np.ptp(load)), LOADS)
         column = np.empty(len(angle))
         for trial in simulator.trials:
-            heat = chain.drive_squared(trial.drive, trial.inputs)
+            drive_squared = chain.drive_squared(trial.drive, trial.inputs)
             first.reset()
-            x = first.simulate(np.concatenate(([chain.to_drive_squared(model.cold_drive)], heat)))
+            cold = chain.to_drive_squared(model.cold_drive)
+            x = first.simulate(np.concatenate(([cold], drive_squared)))
             outputs = np.stack([_held(stage, model.sign * (x - one)) for one in loads])
             moving, still = (_balance(theta, load, demand, loads, given) for given in (
                 _along(stage, model.sign, x, angle[trial.rows], theta, load), outputs))

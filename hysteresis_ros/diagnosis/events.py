@@ -21,7 +21,7 @@ MARGIN = 0.06
 
 def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | None, float]:
     """
-    Return when something may have happened, and how probable that is beside the sets of effects.
+    Return when something may have happened, and how probable that is against the sets of effects.
 
     A step of unknown size in the response, or in the muscle's length, is one more column of the
     response; its size has a Gaussian prior of the size of the residual, and each moment the same
@@ -56,12 +56,12 @@ def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | No
     for point in selection.covariance.points:
         whitened = point.whiten(residual)
         base = point.constant - 0.5 * float(whitened @ whitened)
-        for shape, enough in zip(shapes, large):
+        for shape, explains in zip(shapes, large):
             columns = point.whiten(steps * shape[:, None])
             precision = np.sum(columns ** 2, axis=0) + 1.0 / prior
             slope = columns.T @ whitened
             evidence = base + 0.5 * slope ** 2 / precision - 0.5 * np.log(precision * prior)
-            evidence[~enough] = -np.inf
+            evidence[~explains] = -np.inf
             index = int(np.argmax(evidence))
             if evidence[index] > best:
                 best, moment = float(evidence[index]), rows[index]

@@ -55,9 +55,9 @@ class Start:
         return self.effect.id
 
 
-def starts_beside(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[Start]:
+def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[Start]:
     """
-    Linearise effects at all their starts, with the effects of a fit in place.
+    Linearise effects at all their starts, with the effects of a fit fixed.
 
     Parameters
     ----------
@@ -114,14 +114,14 @@ class _Moves:
 
 class Linearised:
     """
-    Evidences of single effects and pairs beside a fit.
+    Evidences of single effects and pairs, in addition to the effects of a fit.
 
     Parameters
     ----------
     points : list of Point
         Covariances to try.
     residual : ndarray, shape (n,)
-        What the fit leaves.
+        Of the fit.
     starts : list of Start
     nuisance : ndarray, shape (n, m)
         Derivatives by the parameters of the fit, in units of their prior's spread; they are
@@ -200,16 +200,16 @@ class Linearised:
     def pairs(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
         """Return the same for pairs of effects, from the best few starts of each."""
         alone = self.evidences(np.arange(len(self.starts))[:, None])
-        kept: dict[str, list[int]] = {}
+        best_starts: dict[str, list[int]] = {}
         for index in np.argsort(-alone, kind='stable'):
-            own = kept.setdefault(self.starts[index].id, [])
+            own = best_starts.setdefault(self.starts[index].id, [])
             if len(own) < PAIRED_STARTS:
                 own.append(int(index))
         chosen: list[tuple[int, int]] = []
-        for one, other in itertools.combinations(kept, 2):
-            first, second = (self.starts[kept[name][0]].effect for name in (one, other))
+        for one, other in itertools.combinations(best_starts, 2):
+            first, second = (self.starts[best_starts[name][0]].effect for name in (one, other))
             if other not in first.replaces and one not in second.replaces:
-                chosen += itertools.product(kept[one], kept[other])
+                chosen += itertools.product(best_starts[one], best_starts[other])
         found: dict[tuple[str, ...], tuple[float, list[Effect]]] = {}
         for indices, value in zip(chosen, self.evidences(np.array(chosen).reshape(-1, 2))):
             effects = [self.starts[index].effect for index in indices]
@@ -241,7 +241,7 @@ class Linearised:
         draws = point.factor @ rng.standard_normal((len(point.factor), count))
         alone = np.arange(len(self.starts))[:, None]
         derivatives, _ = self._places(alone)
-        chance = np.full((len(self.starts), count), -np.inf)
+        by_chance = np.full((len(self.starts), count), -np.inf)
         base = np.full(count, -np.inf)
         for other, gram in zip(self._points, self._grams):
             drawn = other.whiten(draws)
@@ -259,9 +259,9 @@ class Linearised:
                 solved = np.linalg.solve(factor, slope)
                 evidence = (evidence + 0.5 * np.sum(solved ** 2, axis=1) - np.sum(
                     np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)[:, None])
-            chance = np.maximum(chance, evidence)
+            by_chance = np.maximum(by_chance, evidence)
             base = np.maximum(base, other.constant - 0.5 * np.sum(drawn ** 2, axis=0))
-        best = np.max(chance - base, axis=0)
+        best = np.max(by_chance - base, axis=0)
         present_base = max(other.constant - 0.5 * gram[0, 0]
                            for other, gram in zip(self._points, self._grams))
         return {names[0]: float((1 + np.sum(best >= value - present_base)) / (1 + count))

@@ -69,7 +69,7 @@ def may_differ(problem: Problem, effect: Effect) -> bool:
 
 def unaffected(fixed: Sequence[Effect], effects: Sequence[Effect]) -> list[Effect]:
     """
-    Return the effects of a model that stay as they are beside fitted ones.
+    Return the effects of a model that are not refitted with others.
 
     An effect of the wire that the bench has shown may be fitted anew to the wires of an arm.
     """

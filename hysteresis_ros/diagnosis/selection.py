@@ -4,9 +4,9 @@
 Select the set of effects that explains runs of an arm, by its posterior probability.
 
 All effects and all pairs are scored by linearisation at every start; the best are fitted in full.
-Sets are then grown from the most probable ones, again by linearisation beside each and full fits of
-the best, until none of the most probable sets has not been grown from. What is compared in the end
-are full fits.
+Sets are then grown from the most probable ones, again by linearisation at each and full fits of the
+best, until none of the most probable sets has not been grown from. What is compared in the end are
+full fits.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance, Point
 from hysteresis_ros.diagnosis.discrepancy import covariance
-from hysteresis_ros.diagnosis.linearised import Linearised, Start, starts_beside
+from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_starts
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 from hysteresis_ros.effects import Effect
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 FIRST_POINTS = ((0.1, 0.05), (0.4, 0.3), (1.5, 0.3), (6.0, 0.3))
 # Sets that are begun, for one that is fitted to the end, and steps of what is begun.
 BEGUN, FIRST_STEPS = 3, 3
-# Of several effects each has to take this share off the first error, to be seen beside it.
+# Of several effects each has to take this share off the first error, to be seen with the others.
 LEAST_SHARE = 0.015
 SIGNIFICANCE = 0.05
 
@@ -59,6 +59,9 @@ class Selection:
         The best full fit of each set.
     unobservable : dict of str to str
         Effects that this data cannot show, with the reason.
+    rmse_95 : float
+        Root mean square that the base model's own error stays below at 95 %, in the unit of the
+        response.
     temper : float
         What log evidences are divided by; see `Settings.coarsening`.
     """
@@ -88,7 +91,7 @@ class Selection:
         # Both with the response that they belong to.
         self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
         self._errors: dict[frozenset[str], tuple[np.ndarray, float]] = {}
-        self.limit = self.covariance.largest_error(rng, settings.draws)
+        self.rmse_95 = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised
         self.p_values: dict[str, float] = {}
 
@@ -104,7 +107,7 @@ class Selection:
             stage()
 
     def _score(self) -> None:
-        self.alone = self._beside(frozenset())
+        self.alone = self._linearised_with(frozenset())
 
     def _fit_alone(self) -> None:
         """Fit every effect by itself, from the start that scored best."""
@@ -114,7 +117,7 @@ class Selection:
         self._refine(1)
 
     def _grow_sets(self) -> None:
-        """Grow sets, size by size, while the best one leaves too much."""
+        """Grow sets, size by size, while the residual of the best one is too large."""
         for size in range(1, self.settings.most_effects):
             if not self._worth_growing():
                 break
@@ -138,22 +141,22 @@ class Selection:
         return family.p_values(self.base.require_point(), self.rng, self.settings.draws)
 
     def _worth_growing(self) -> bool:
-        """Whether larger sets are due: the best leaves too much, or what it should not leave."""
+        """Whether the best set's residual is too large, or one more effect explains some of it."""
         valid = self.valid()
         if not valid:
             return True
         best = next((names for names in valid if self.sufficient(names)), valid[0])
-        form = self.settings.form * self.structure(frozenset()) if best else 0.0
-        if self.structure(best) > math.hypot(self.limit, form):
+        form = self.settings.form * self.noise_free_rmse(frozenset()) if best else 0.0
+        if self.noise_free_rmse(best) > math.hypot(self.rmse_95, form):
             return True
         # What a further effect explains has to exceed the base model's own error.
         return bool(best) and self.error(best) > self.covariance.size and self._promising(best)
 
     def _promising(self, names: frozenset[str]) -> bool:
         """Whether one more effect makes a set more probable, by linearisation."""
-        beside = self._beside(names)
-        alone, = beside.evidences(np.zeros((1, 0), dtype=int))
-        gain = max((value for value, _ in beside.singles().values()), default=-np.inf) - alone
+        further = self._linearised_with(names)
+        alone, = further.evidences(np.zeros((1, 0), dtype=int))
+        gain = max((value for value, _ in further.singles().values()), default=-np.inf) - alone
         return gain / self.temper > -self._odds
 
     def grow(self, names: frozenset[str]) -> None:
@@ -162,7 +165,7 @@ class Selection:
             return
         self._grown.add(names)
         fit = self.fits[names]
-        found = self._beside(names).singles()
+        found = self._linearised_with(names).singles()
         self._fit_best({key: (value, [
             *(one for one in fit.effects if one.id not in effects[0].replaces), *effects])
             for key, (value, effects) in found.items()})
@@ -177,16 +180,16 @@ class Selection:
         effect : Effect
             Its values are one of the starts.
         """
-        kept = [one for one in fit.effects if one.id not in effect.replaces]
+        others = [one for one in fit.effects if one.id not in effect.replaces]
         starts = [*starts_of(effect, self.problem.kind, self.problem.measured), effect]
-        found = self.fitter.fit([[*kept, start] for start in starts], self._metric(),
+        found = self.fitter.fit([[*others, start] for start in starts], self._metric(),
                                 FIRST_STEPS)
         found.sort(key=lambda one: -one.log_evidence)
         found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
         return self.fitter.refined(max(found, key=lambda one: one.log_evidence))
 
-    def _beside(self, names: frozenset[str]) -> Linearised:
-        """Linearise all other effects beside a set."""
+    def _linearised_with(self, names: frozenset[str]) -> Linearised:
+        """Return all other effects, linearised at the values that those of a set have."""
         fit = self.fits[names]
         known = self._linearised.get(names)
         if known is None or known[0] is not fit.predicted:
@@ -196,7 +199,7 @@ class Selection:
             self._linearised[names] = known = (fit.predicted, Linearised(
                 [fit.require_point()] if fit.covariance else self.covariance.points,
                 self.problem.measured - fit.predicted,
-                starts_beside(self.fitter, fit, others), fit.jacobian * spread))
+                linearised_starts(self.fitter, fit, others), fit.jacobian * spread))
         return known[1]
 
     def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
@@ -238,7 +241,7 @@ class Selection:
         self.base = self.fits[frozenset()]
 
     def _refine_best(self) -> None:
-        """Make sure that the answer is compared with what is left if any of it is left out."""
+        """Fit what remains of the most probable sets without any one of their effects."""
         for _ in range(self.settings.most_effects):
             valid = self.valid()
             if not valid:
@@ -272,16 +275,16 @@ class Selection:
             self._errors[names] = known = (fit.predicted, found)
         return known[1]
 
-    def structure(self, names: frozenset[str]) -> float:
+    def noise_free_rmse(self, names: frozenset[str]) -> float:
         """Return the root mean square of a set's residual without white noise."""
         noise = self.fits[names].require_point().noise
         return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
 
     def sufficient(self, names: frozenset[str]) -> bool:
-        """Whether a set leaves no more than the base model's own error could be."""
+        """Whether a set's residual is no larger than the base model's own error could be."""
         share = self.settings.residual_share / max(len(names), 1)
-        allowed = self.limit ** 2 + share * self.structure(frozenset()) ** 2
-        return self.structure(names) ** 2 <= allowed
+        allowed = self.rmse_95 ** 2 + share * self.noise_free_rmse(frozenset()) ** 2
+        return self.noise_free_rmse(names) ** 2 <= allowed
 
     def valid(self) -> list[frozenset[str]]:
         """
@@ -291,8 +294,8 @@ class Selection:
         practical size and by more than the expected error of the base model, and if others stay,
         it is larger than the base model's own error could be, or these are clearly less probable.
         A single effect also has to explain more than the best of all would by chance; and no set
-        of as few effects leaves less by more than the base model's error and that of an effect's
-        equation could be.
+        of as few effects has a smaller residual, by more than the base model's error and that of an
+        effect's equation could be.
         """
         physical = [names for names in self.ranked() if not self.fits[names].implausible()]
         return [names for names in physical if self._each_matters(names)
