@@ -176,7 +176,7 @@ class Fitter:
                 [[*unaffected(self.fixed, effects), *effects] for effects in sets])
 
     def error(self, predicted: np.ndarray) -> float:
-        """Return the root mean square error of a response."""
+        """Return the root mean square error of a response (n,), in its unit."""
         return float(np.sqrt(np.mean((self.problem.measured - predicted) ** 2)))
 
     def fit(self, sets: Sequence[Sequence[Effect]], point: Point,

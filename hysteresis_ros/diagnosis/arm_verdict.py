@@ -49,6 +49,11 @@ def arm_verdict(problem: ArmProblem, settings: Settings, rng: np.random.Generato
     settings : Settings
     rng : numpy.random.Generator
     progress : callable
+        ``progress(items, total)``, for a progress bar.
+
+    Returns
+    -------
+    Diagnosis
     """
     selection = Selection(problem, settings, rng, progress)
     selection.run()

@@ -62,7 +62,11 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     Raises
     ------
     IdentificationError
-        If a trial is not in the table.
+        If a trial is not in the table, or none is left to fit.
+    MeasurementError
+        If the table has too few rows, or the length stage is none of Preisach's.
+    ParameterError
+        If an effect is unknown, named twice, already there, or cannot show in a bench table.
     """
     rows = choose_trials(length, length_trials, 'length')
     if not rows.any():

@@ -176,7 +176,7 @@ class BenchFitter:
         return response.fit(response.minimise(vector, MOST_EVALUATIONS, TOLERANCE))
 
     def error(self, predicted: np.ndarray) -> float:
-        """Return the root mean square error of a response."""
+        """Return the root mean square error of a response (n,), in its unit."""
         return float(np.sqrt(np.mean((self.problem.measured - predicted) ** 2)))
 
     def cross_validate(self, fit: Fit) -> Fit:

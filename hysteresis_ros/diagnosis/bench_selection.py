@@ -107,7 +107,7 @@ class BenchSelection:
         return [fit for fit in fits if np.all(np.isfinite(fit.held_out))]
 
     def error(self, fit: Fit) -> float:
-        """Return the held-out RMSE of a fit."""
+        """Return the held-out RMSE of a fit, in the unit of the response."""
         return self.fitter.error(fit.held_out)
 
     def _gains(self, fit: Fit) -> np.ndarray:
@@ -165,7 +165,7 @@ class BenchSelection:
 
 
 def subsets(effects: Sequence[Effect], most: int) -> list[list[Effect]]:
-    """Return every set of at most `most` of the effects in which none contains another."""
+    """Return every set of at most `most` of the effects in which none replaces another."""
     return [list(subset) for size in range(1, most + 1)
             for subset in itertools.combinations(effects, size)
             if not any(other.id in effect.replaces for effect in subset for other in subset)]

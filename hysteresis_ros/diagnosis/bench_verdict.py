@@ -39,8 +39,13 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
     settings : Settings
     rng : numpy.random.Generator
     jobs : int
-        Processes.
+        Processes; -1 for all cores.
     progress : callable
+        ``progress(items, total)``, for a progress bar.
+
+    Returns
+    -------
+    Diagnosis
     """
     selection = BenchSelection(problem, settings, rng, jobs, progress)
     selection.run()

@@ -137,7 +137,14 @@ class Covariance:
         return float(density), gradient
 
     def point(self, values: np.ndarray) -> Point:
-        """Return the covariance for values (4,)."""
+        """
+        Return the covariance for values (4,).
+
+        Raises
+        ------
+        LinAlgError
+            If it is not positive definite by rounding.
+        """
         discrepancy, drift, white = self._parts(values)
         total = discrepancy + drift
         total[np.diag_indices_from(total)] += white
@@ -147,7 +154,7 @@ class Covariance:
         return Point(np.array(values), factor, constant)
 
     def white(self, size: float) -> Point:
-        """Return the covariance of white noise alone, in which a fit is one by least squares."""
+        """Return the covariance of white noise of a size alone: a fit is one by least squares."""
         count = len(self._discrepancy)
         values = np.array([self._low[0], self._low[1], self._middle, np.log(size)])
         return Point(values, size * np.eye(count), -np.inf)
@@ -169,6 +176,11 @@ class Covariance:
             Number of draws.
         level : float
             The probability.
+
+        Returns
+        -------
+        float
+            In the unit of the response.
         """
         values, vectors = linalg.eigh(self._discrepancy)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -187,6 +199,11 @@ class Covariance:
             Measured less simulated.
         values : ndarray, shape (4,), optional
             Where to begin; by default both where all is noise and where all is drift.
+
+        Returns
+        -------
+        ndarray, shape (4,)
+            As `Point.values`.
         """
         share = float(np.sqrt(np.mean(residual ** 2))) / self._scale
         starts = [self.start(0.1, share), self.start(share, 0.1)] if values is None else [

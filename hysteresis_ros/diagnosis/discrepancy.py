@@ -128,6 +128,16 @@ def path_difference(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarra
         Rows and model.
     effects : sequence of Effect
         Effects of the model.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Angles [rad].
+
+    Raises
+    ------
+    ParameterError
+        If the model has no geometry.
     """
     model = problem.model
     # What the sensor adds is no way of the arm; what depends on the phase would need it, and

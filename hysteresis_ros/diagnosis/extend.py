@@ -105,7 +105,7 @@ class Extension(Result):
 
 
 def rmse(model: MuscleModel, measurements: Iterable[Measurement]) -> float:
-    """Root mean square error of a model over recordings, in the unit of the response."""
+    """Return the root mean square error of a model over recordings, in the response's unit."""
     squares, rows = 0.0, 0
     for measurement in measurements:
         error = model.predict(measurement) - measurement.column(measurement.response)

@@ -31,6 +31,10 @@ def problem_for(model: MuscleModel, measurements: Iterable[Measurement],
     jobs : int
         Threads for the simulations; -1 for all cores.
 
+    Returns
+    -------
+    ArmProblem or BenchProblem
+
     Raises
     ------
     MeasurementError

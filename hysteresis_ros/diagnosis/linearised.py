@@ -189,7 +189,14 @@ class Linearised:
         return best
 
     def singles(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
-        """Return for each effect the best evidence and the start that reaches it."""
+        """
+        Score single effects.
+
+        Returns
+        -------
+        dict of tuple of str to (float, list of Effect)
+            By the name of the effect its largest log evidence, and the start that reaches it.
+        """
         values = self.evidences(np.arange(len(self.starts))[:, None])
         found: dict[tuple[str, ...], tuple[float, list[Effect]]] = {}
         for start, value in zip(self.starts, values):
@@ -198,7 +205,14 @@ class Linearised:
         return found
 
     def pairs(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
-        """Return the same for pairs of effects, from the best few starts of each."""
+        """
+        Score pairs of effects, from the best few starts of each.
+
+        Returns
+        -------
+        dict of tuple of str to (float, list of Effect)
+            By their sorted names the largest log evidence, and the starts that reach it.
+        """
         alone = self.evidences(np.arange(len(self.starts))[:, None])
         best_starts: dict[str, list[int]] = {}
         for index in np.argsort(-alone, kind='stable'):

@@ -100,6 +100,20 @@ def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
 
     All combinations of the starts of its parameters, thinned evenly to at most `most`, and what
     the response, where it is given, suggests.
+
+    Parameters
+    ----------
+    effect : Effect
+    kind : str
+        'arm' or 'bench'.
+    measured : ndarray, shape (n,), optional
+        The response.
+    most : int
+        Combinations, without those that the response suggests.
+
+    Returns
+    -------
+    list of Effect
     """
     fitted = [parameter for parameter in effect.parameters if kind in parameter.kinds]
     combinations = list(itertools.product(

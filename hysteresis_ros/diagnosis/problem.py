@@ -34,10 +34,20 @@ class Problem:
     """
     Measured rows of one or more recordings of one kind.
 
+    Parameters
+    ----------
+    model : MuscleModel
+    measurements : sequence of Measurement
+        All of one kind and one response.
+
     Attributes
     ----------
     measured : ndarray, shape (n,)
-        The response in the rows that are judged.
+        The response in the rows that are judged: an angle [rad], a length [m] or a strain.
+    noise : float
+        Standard deviation that the sensor's resolution causes, in the unit of the response.
+    clock : ndarray, shape (n,)
+        Time of each row since the first recording began [s].
     trial, fold, block : ndarray of int, shape (n,)
         Which trial a row is of, which rows are held out together, and which count as one in the
         significance.
@@ -66,7 +76,14 @@ class Problem:
         self.signals = self._signals()
 
     def completed(self, effects: Sequence[Effect]) -> MuscleModel:
-        """Return the model with effects; where weights are refitted, with new ones."""
+        """
+        Return the model with effects; where weights are refitted, with new ones.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        """
         raise NotImplementedError
 
     def pick(self, columns: Sequence[np.ndarray]) -> np.ndarray:

@@ -30,6 +30,20 @@ def predictable(signals: Mapping[str, np.ndarray], residual: np.ndarray, fold: n
 
     Random cosine features of all signals with ridge regression; the best of some ridges is taken,
     which favours the regression a little.
+
+    Parameters
+    ----------
+    signals : dict of str to ndarray, shape (n,)
+    residual : ndarray, shape (n,)
+    fold : ndarray of int, shape (n,)
+        Which rows are held out together.
+    seed : int
+        Of the features.
+
+    Returns
+    -------
+    float
+        From 0 to 1.
     """
     if not signals:
         return 0.0
@@ -62,6 +76,10 @@ def shares(problem: Problem, residual: np.ndarray) -> dict[str, float]:
     ----------
     problem : Problem
     residual : ndarray, shape (n,)
+
+    Returns
+    -------
+    dict of str to float
     """
     found = {name: predictable({name: values}, residual, problem.fold)
              for name, values in problem.signals.items()}

@@ -179,6 +179,15 @@ class Selection:
         fit : Fit
         effect : Effect
             Its values are one of the starts.
+
+        Returns
+        -------
+        Fit
+
+        Raises
+        ------
+        ValueError
+            If no start can be simulated.
         """
         others = [one for one in fit.effects if one.id not in effect.replaces]
         starts = [*starts_of(effect, self.problem.kind, self.problem.measured), effect]
@@ -265,7 +274,24 @@ class Selection:
         return sorted(self.fits, key=lambda names: -self.log_posterior(names))
 
     def error(self, names: frozenset[str]) -> float:
-        """Return the RMSE of a set on all judged rows, fitted by least squares."""
+        """
+        Return the RMSE of a set on all judged rows, fitted by least squares.
+
+        Parameters
+        ----------
+        names : frozenset of str
+            A set that was fitted.
+
+        Returns
+        -------
+        float
+            In the unit of the response.
+
+        Raises
+        ------
+        KeyError
+            If the set was not fitted.
+        """
         fit = self.fits[names]
         known = self._errors.get(names)
         if known is None or known[0] is not fit.predicted:

@@ -12,7 +12,7 @@ DRAWS = 400
 
 
 def block_sums(values: np.ndarray, block: np.ndarray) -> np.ndarray:
-    """Sum values (n,) by block, shape (blocks,)."""
+    """Sum values (n,) by the block (n,) that each is in, shape (blocks,)."""
     return np.bincount(block, weights=values)
 
 
@@ -25,7 +25,8 @@ def paired_p_values(gains: np.ndarray, rng: np.random.Generator, count: int = DR
     gains : ndarray, shape (c, blocks)
         Reduction of the squared error in each block by each candidate.
     rng : numpy.random.Generator
-        Source of randomness.
+    count : int
+        Number of draws of the signs.
 
     Returns
     -------
@@ -53,6 +54,16 @@ def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
         Residuals without and with the effect.
     block : ndarray of int, shape (n,)
         Block of every row.
+    rng : numpy.random.Generator
+    level : float
+        Probability of the interval.
+    count : int
+        Number of draws of the blocks.
+
+    Returns
+    -------
+    low, high : float
+        1 - RMSE after / RMSE before.
     """
     squares = [block_sums(values ** 2, block) for values in (before, after)]
     blocks = len(squares[0])
