@@ -180,7 +180,7 @@ def identify(length: Source | None = None, force: Source | None = None, *,
         tables['length'], tables['force'], force_trials=force_trials, length_trials=length_trials,
         geometry=None if geometry is None else _geometry(geometry), levels=levels,
         operator=operator, anchored=anchored)
-    if names == []:
+    if names == [] or tables['length'] is None:
         return found
     from hysteresis_ros.diagnosis.bench_effects import add_effects
     model, added = add_effects(

@@ -19,6 +19,9 @@ import threadpoolctl
 # Time between two looks at whether the process that gave the work still lives [s].
 LOOK_PERIOD = 1.0
 
+# A progress bar: given the items of a long computation and their number, it returns the items.
+Progress = Callable[[Iterable, int], Iterable]
+
 _LOCK = threading.Lock()
 _limits: threadpoolctl.threadpool_limits | None = None
 _holders: dict[int, int] = {}    # thread to how often it has entered

@@ -23,10 +23,10 @@ def table(respond):
     """Return four trials of a drive that wanders, with what `respond` makes of it."""
     drive, length = [], []
     for trial in range(4):
-        chance = np.random.default_rng(trial)
-        turns = np.sort(chance.choice(np.arange(10, ROWS - 10), 8, replace=False))
+        rng = np.random.default_rng(trial)
+        turns = np.sort(rng.choice(np.arange(10, ROWS - 10), 8, replace=False))
         drive.append(np.interp(np.arange(ROWS), [0, *turns, ROWS - 1],
-                               [0.0, *chance.uniform(0.0, 1.0, 9)]))
+                               [0.0, *rng.uniform(0.0, 1.0, 9)]))
         length.append(respond(drive[-1]))
     return Measurement.from_columns({
         'time': np.tile(STEP * np.arange(1, ROWS + 1), 4), 'trial': np.repeat(np.arange(4.0), ROWS),

@@ -126,7 +126,7 @@ def test_effects_of_sensor_and_mechanism_are_in_the_reported_set(model, name):
 
 
 def test_the_answer_is_the_most_probable_set(model):
-    """And what it leaves without white noise is no more than the base model's own error."""
+    """And its residual without white noise is no more than the base model's own error."""
     train, _ = recordings({'payload_error': 1.0})
     found = diagnose(model, [train], ['payload_error', 'encoder_offset', 'supply_sag'], seed=SEED)
     assert found.sets[0]['effects'] == found.missing == ['payload_error']

@@ -253,14 +253,14 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(model, noise):
 
 
 def test_the_evidence_under_the_covariance_of_the_residuals_is_the_larger_one(loaded):
-    """Noise and drift are estimated from what a fit leaves, which no evidence makes smaller."""
+    """Noise and drift are estimated from the residual of a fit, which no evidence makes smaller."""
     fit, = loaded.fit([[neutral(loaded, 'supply_sag')]], loaded.covariance.points[0])
-    kept = list(loaded.covariance.points)
+    points = list(loaded.covariance.points)
     try:
         refined = loaded.refined(fit)
-        assert len(loaded.covariance.points) == len(kept) + 1
+        assert len(loaded.covariance.points) == len(points) + 1
     finally:
-        loaded.covariance.points[:] = kept
+        loaded.covariance.points[:] = points
     assert refined.log_evidence > fit.log_evidence
 
 

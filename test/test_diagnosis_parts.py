@@ -46,17 +46,17 @@ def test_the_interval_of_a_gain_holds_its_value():
     assert block_sums(np.ones(240), block).tolist() == [10.0] * 24
 
 
-def test_cosines_and_what_is_left_beside_columns():
+def test_cosines_and_the_residual_of_columns():
     """Opposite directions are the same signature; projections are orthogonal."""
     vectors = np.array([[1.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
     expected = [[1, 1, 0.5 ** 0.5, 0], [1, 1, 0.5 ** 0.5, 0], [0.5 ** 0.5, 0.5 ** 0.5, 1, 0],
                 [0, 0, 0, 0]]
     assert cosines(vectors) == pytest.approx(np.array(expected))
     columns = np.array([[1.0, 2.0], [1.0, 2.0], [0.0, 0.0]])
-    left = residualise(columns, vectors)
-    assert np.abs(left @ columns).max() < 1e-12
-    assert left[2] == pytest.approx([0.0, 0.0, 0.0])
-    assert left[0] == pytest.approx([0.5, -0.5, 0.0])
+    residual = residualise(columns, vectors)
+    assert np.abs(residual @ columns).max() < 1e-12
+    assert residual[2] == pytest.approx([0.0, 0.0, 0.0])
+    assert residual[0] == pytest.approx([0.5, -0.5, 0.0])
     assert residualise(np.zeros((3, 0)), vectors) is vectors
 
 

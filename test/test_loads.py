@@ -39,8 +39,8 @@ def test_the_error_of_loads_left_out_is_kept(two_loads, tmp_path):
     length, force = tables()
     found = identify(length, force, length_trials=range(4), force_trials=[0])
     fit = found.length_fit
-    kept = found.model.metrics['length']['left_out']['rmse']
-    assert kept == fit.validation[fit.strengths == fit.strength][0] > fit.rmse
+    left_out = found.model.metrics['length']['left_out']['rmse']
+    assert left_out == fit.validation[fit.strengths == fit.strength][0] > fit.rmse
     # Without trials that verify, it is what the bench's error is known from.
     assert length_error(two_loads) == two_loads.metrics['length']['left_out']['rmse']
     assert length_error(two_loads) > 2.0 * two_loads.metrics['length']['identification']['rmse']

@@ -49,7 +49,7 @@ def payload(model):
 
 
 def test_the_planted_effect_is_the_most_probable_answer(payload):
-    """With its value, and it leaves nothing that the base model's own error could not be."""
+    """With its value, and its residual is no larger than the base model's own error could be."""
     best = payload.valid()[0]
     assert best == {'payload_error'}
     fit = payload.fits[best]

@@ -124,10 +124,20 @@ def base_model(muscle: str, seed: int, material: bool):
     return model
 
 
-def run(case: Case, model) -> Row:
-    """Diagnose one case with the model of its specimen and return what is scored."""
+def run(case: Case, model, settings=None) -> Row:
+    """
+    Diagnose one case with the model of its specimen and return what is scored.
+
+    Parameters
+    ----------
+    case : Case
+    model : MuscleModel
+    settings : Settings, optional
+        Of the diagnosis.
+    """
     from hysteresis_ros.diagnosis.diagnose import diagnose
     from hysteresis_ros.diagnosis.extend import extend, rmse
+    from hysteresis_ros.diagnosis.settings import Settings
     from hysteresis_ros.laboratory.experiments import experiment_tables
     from hysteresis_ros.measurements.table import Measurement
 
@@ -135,7 +145,7 @@ def run(case: Case, model) -> Row:
     started = time.perf_counter()
     tables = experiment_tables(protocol, effects, seed, muscle)
     train, test = (Measurement.from_columns(tables[name]) for name in ('train.csv', 'test.csv'))
-    found = diagnose(model, [train], seed=seed)
+    found = diagnose(model, [train], seed=seed, settings=settings or Settings())
     reported = set(found.missing).union(*found.alternatives) if found.missing else set()
     result = {'muscle': muscle, 'group': group, 'protocol': protocol, 'truth': sorted(effects),
               'seed': seed, 'verdict': found.verdict, 'missing': found.missing,

@@ -3,62 +3,126 @@
 """
 Show how the scores of the hidden effects move when each setting is halved and doubled.
 
-None may decide. The cases are those of `tools/hidden.py`, on specimens that are scored nowhere
-else.
+The cases are those of `tools/hidden.py`, on specimens that are scored nowhere else; the models are
+identified once, with the settings as they are. The table is Markdown: a row for each changed
+setting, with what each score is and, in parentheses, by how much it moved.
 """
 
 import argparse
+from collections.abc import Sequence
 import dataclasses
+from pathlib import Path
 import sys
 
-import joblib
-
-from hidden import base_model, cases, FIRST_SEED, run, score
-
+from hidden import base_model, Case, cases, FIRST_SEED, run
+from hidden_scores import FIRST_MUSCLE, Row, score
 from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.laboratory.plant import MUSCLES
+from hysteresis_ros.workers import delayed, in_parallel
 
-# A setting that counts stays a number that can be counted.
+NAMES = [field.name for field in dataclasses.fields(Settings)]
 FACTORS = (0.5, 2.0)
+USUAL = 'as it is'
+# Cases of none, of an unknown effect and of a pair, of which `sample` takes its share.
+OTHERS = 4
 
 
-def variants():
-    """Return the settings by name: as they are, and with each halved and doubled."""
+def variants(names: Sequence[str] = NAMES) -> dict[str, Settings]:
+    """Return the settings by what was changed: nothing, and each named one halved and doubled."""
     usual = Settings()
-    found = {'as it is': usual}
-    for field in dataclasses.fields(Settings):
+    found = {USUAL: usual}
+    for name in names:
+        value = getattr(usual, name)
         for factor in FACTORS:
-            value = getattr(usual, field.name)
+            # A setting that counts stays a number that can be counted.
             changed = type(value)(factor * value)
-            if changed != value:
-                found[f'{field.name} {value:g} -> {changed:g}'] = dataclasses.replace(
-                    usual, **{field.name: changed})
+            found[f'{name} {value:g} -> {changed:g}'] = dataclasses.replace(
+                usual, **{name: changed})
     return found
 
 
-def main():
-    """Run the cases with every variant, and print a table."""
+def sample(count: int, first_seed: int, only: str | None = None,
+           muscle: str = FIRST_MUSCLE) -> list[Case]:
+    """
+    Return cases of the hidden-effect grid, evenly spread over it.
+
+    Parameters
+    ----------
+    count : int
+        How many, at most.
+    first_seed : int
+        Takes the place of the grid's own.
+    only : str, optional
+        One effect or group.
+    muscle : str
+        Constitutive model of the wires.
+    """
+    found = [case for case in cases(1, OTHERS, muscles=(muscle,))
+             if only is None or only in (case.group, *case.effects)]
+    count = min(count, len(found))
+    spread = [found[number * len(found) // count] for number in range(count)]
+    return [case._replace(seed=case.seed - FIRST_SEED + first_seed) for case in spread]
+
+
+def to_markdown(results: dict[str, list[Row]]) -> str:
+    """
+    Return a table of the scores, a row for each variant of the settings.
+
+    Parameters
+    ----------
+    results : dict of str to list of dict
+        What `hidden.run` returned for every case, by the name of the variant; the first one is
+        what the others are compared with. Scores that no case counts for are left out.
+    """
+    scores = {name: {key: value for key, (value, *_) in score(rows).items()}
+              for name, rows in results.items()}
+    usual = next(iter(scores.values()))
+    heading = [key for key in usual if any(one[key] is not None for one in scores.values())]
+    lines = ['| setting | cases | ' + ' | '.join(heading) + ' |',
+             '|---|---' + '|---' * len(heading) + '|']
+    for name, found in scores.items():
+        cells = [_cell(found[key], usual[key]) for key in heading]
+        lines.append(f'| {name} | {len(results[name])} | ' + ' | '.join(cells) + ' |')
+    return '\n'.join(lines) + '\n'
+
+
+def _cell(value: float | None, usual: float | None) -> str:
+    if value is None:
+        return '-'
+    moved = '' if usual is None or value == usual else f' ({value - usual:+.3g})'
+    return f'{value:.3g}{moved}'
+
+
+def main() -> None:
+    """Run the cases with every variant, and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--cases', type=int, default=12, metavar='N',
+                        help='of each variant, at most (default: %(default)s)')
     parser.add_argument('--first-seed', type=int, default=500)
-    parser.add_argument('--every', type=int, default=9, help='of the cases of one specimen')
+    parser.add_argument('--only', help='one effect or group')
+    parser.add_argument('--settings', nargs='+', choices=NAMES, default=NAMES, metavar='NAME',
+                        help='those to change (default: all)')
+    parser.add_argument('--muscle', choices=MUSCLES, default=FIRST_MUSCLE,
+                        help='constitutive model of the wires (default: %(default)s)')
     parser.add_argument('--jobs', type=int, default=-1)
+    parser.add_argument('--output', metavar='FILE', help='the table, too')
     args = parser.parse_args()
-    chosen = [(*case[:3], case[3] - FIRST_SEED + args.first_seed, *case[4:])
-              for case in cases(1, 4)][::args.every]
-    seeds = sorted({case[3] for case in chosen})
-    parallel = joblib.Parallel(n_jobs=args.jobs)
-    models = dict(zip(seeds, parallel(joblib.delayed(base_model)(seed, True) for seed in seeds)))
-    heading = None
-    for name, settings in variants().items():
-        results = parallel(
-            joblib.delayed(run)(case, models[case[3]], settings=settings) for case in chosen)
-        scores = score(results)
-        if heading is None:
-            heading = list(scores)
-            print('| setting | ' + ' | '.join(heading) + ' |')
-            print('|' + '---|' * (1 + len(heading)))
-        cells = ['-' if value is None else f'{value:.3g}' for value, *_ in scores.values()]
-        print(f'| {name} | ' + ' | '.join(cells) + ' |', flush=True)
-        print(f'{len(results)} cases', file=sys.stderr)
+    chosen = sample(args.cases, args.first_seed, args.only, args.muscle)
+    if not chosen:
+        parser.error('no case: --cases has to be 1 or more, and --only an effect or group that '
+                     'the muscle has')
+    seeds = sorted({case.seed for case in chosen})
+    models = dict(zip(seeds, in_parallel(
+        [delayed(base_model)(args.muscle, seed, True) for seed in seeds], args.jobs)))
+    print(f'{len(models)} specimens identified', file=sys.stderr, flush=True)
+    results: dict[str, list[Row]] = {}
+    for name, settings in variants(args.settings).items():
+        results[name] = list(in_parallel(
+            [delayed(run)(case, models[case.seed], settings) for case in chosen], args.jobs))
+        print(f'{name}: {len(chosen)} cases', file=sys.stderr, flush=True)
+        if args.output:
+            Path(args.output).write_text(to_markdown(results), encoding='utf-8')
+    print(to_markdown(results), end='')
 
 
 if __name__ == '__main__':

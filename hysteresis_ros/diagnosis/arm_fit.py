@@ -7,13 +7,21 @@ Gauss-Newton steps with Levenberg's damping. All sets advance together, so that 
 batch of simulations, whatever their number.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
 import dataclasses
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.covariance import Covariance, Point
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector
+from hysteresis_ros.effects import Effect
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
 
 # Simulated responses are smooth only on this scale of the parameters' units.
 DIFFERENCE = 0.02
@@ -52,8 +60,9 @@ class Fit:
         Covariance of the residuals under which the evidence is largest.
     spread : ndarray, shape (k, k)
         Posterior covariance of `vector`.
-    held_out : ndarray, shape (n,), or None
-        Response of every row as predicted by a fit to the other folds.
+    held_out : ndarray, shape (n,)
+        Response of every row as predicted by a fit to the other folds; empty before
+        `cross_validate`.
     covariance : Covariance or None
         That of the base model's error along the way that the arm takes with these effects; None
         for the way that it takes without.
@@ -61,14 +70,14 @@ class Fit:
         How many covariances at hand were tried with `covariance`.
     """
 
-    effects: list
+    effects: list[Effect]
     vector: np.ndarray
     predicted: np.ndarray
     jacobian: np.ndarray
     log_evidence: float = -np.inf
     point: Point | None = None
     spread: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
-    held_out: np.ndarray | None = None
+    held_out: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     covariance: Covariance | None = None
     judged: int = 0
 
@@ -76,6 +85,19 @@ class Fit:
     def names(self) -> tuple[str, ...]:
         """Identifiers of the effects, sorted."""
         return tuple(sorted(effect.id for effect in self.effects))
+
+    def require_point(self) -> Point:
+        """
+        Return the covariance of the residuals under which the evidence is largest.
+
+        Raises
+        ------
+        ValueError
+            If the fit was not judged, or no covariance gives it a finite evidence.
+        """
+        if self.point is None:
+            raise ValueError('a fit has no covariance before it is judged')
+        return self.point
 
     def implausible(self) -> list[str]:
         """Names of parameters whose estimate is outside their physical range."""
@@ -86,20 +108,23 @@ class Fit:
 class _Walk:
     """One set of effects on its way to the maximum."""
 
-    def __init__(self, effects, kind):
+    def __init__(self, effects: Sequence[Effect], kind: str) -> None:
         self.parameters = ParameterVector(effects, kind)
         self.mean, self.spread = self.parameters.prior()
         inside = 1e-6 * (self.parameters.upper - self.parameters.lower)
         self.vector = np.clip(self.parameters.vector(), self.parameters.lower + inside,
                               self.parameters.upper - inside)
         self.damping = FIRST_DAMPING
-        self.predicted = self.jacobian = None
+        # Arrays (n,) and (n, k); None while they are not known at the vector.
+        self.predicted: Any = None
+        self.jacobian: Any = None
         self.cost, self.active = np.inf, True
 
-    def penalty(self, vector):
+    def penalty(self, vector: np.ndarray) -> float:
+        """Return minus twice the log density of the prior at a vector (k,), but for a constant."""
         return float(np.sum(((vector - self.mean) / self.spread) ** 2))
 
-    def moved(self):
+    def moved(self) -> tuple[list[np.ndarray], list[float]]:
         """Return the vectors, each moved in one parameter, with the movements."""
         upper, vectors, steps = self.parameters.upper, [], []
         for index, value in enumerate(self.vector):
@@ -109,7 +134,7 @@ class _Walk:
             steps.append(step)
         return vectors, steps
 
-    def candidate(self, jacobian, residual):
+    def candidate(self, jacobian: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the vector after one step, and the cost that it saves by the linearisation."""
         precision = self.spread ** -2.0
         matrix = jacobian.T @ jacobian + np.diag(precision)
@@ -135,25 +160,27 @@ class Fitter:
         ``discrepancy(fit)``: that of the base model along the way of a fit, shape (n, n).
     """
 
-    def __init__(self, problem, covariance, discrepancy):
+    def __init__(self, problem: ArmProblem, covariance: Covariance,
+                 discrepancy: Callable[[Fit], np.ndarray]) -> None:
         self.problem = problem
         self.covariance = covariance
         self.discrepancy = discrepancy
         self.fixed = list(problem.model.effects)
         self.simulations = 0
 
-    def simulate(self, sets) -> np.ndarray:
-        """Return the responses (len(sets), n) with sets of effects beside the model's own."""
+    def simulate(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
+        """Return the responses (len(sets), n) with sets of effects added to the model's own."""
         self.simulations += len(sets)
         with np.errstate(all='ignore'):
             return self.problem.simulate_many(
                 [[*unaffected(self.fixed, effects), *effects] for effects in sets])
 
-    def error(self, predicted) -> float:
-        """Return the root mean square error of a response."""
+    def error(self, predicted: np.ndarray) -> float:
+        """Return the root mean square error of a response (n,), in its unit."""
         return float(np.sqrt(np.mean((self.problem.measured - predicted) ** 2)))
 
-    def fit(self, sets, point: Point, steps: int = MOST_STEPS) -> list[Fit]:
+    def fit(self, sets: Sequence[Sequence[Effect]], point: Point,
+            steps: int = MOST_STEPS) -> list[Fit]:
         """
         Fit sets of effects from their present values; those whose simulation fails are left out.
 
@@ -170,8 +197,8 @@ class Fitter:
         list of Fit
         """
         walks = [_Walk(effects, self.problem.kind) for effects in sets]
-        for walk, predicted in zip(walks, self._at(walks, [[w.vector] for w in walks])):
-            self._take(walk, walk.vector, predicted[0], point)
+        for walk, own in zip(walks, self._at(walks, [[w.vector] for w in walks])):
+            self._take(walk, walk.vector, own[0], point)
             walk.active = bool(np.isfinite(walk.cost))
         walks = [walk for walk in walks if walk.active]
         for left in range(steps, -1, -1):
@@ -200,13 +227,14 @@ class Fitter:
                                walk.predicted, walk.jacobian))
                 for walk in walks if np.all(np.isfinite(walk.jacobian))]
 
-    def _at(self, walks, vectors):
+    def _at(self, walks: Sequence[_Walk], vectors: Sequence[Sequence[np.ndarray]]
+            ) -> list[list[np.ndarray]]:
         """Return for each walk the responses at its vectors."""
         responses = iter(self.simulate([walk.parameters.with_vector(vector)
                                         for walk, own in zip(walks, vectors) for vector in own]))
         return [[next(responses) for _ in own] for own in vectors]
 
-    def _differentiate(self, walks):
+    def _differentiate(self, walks: Sequence[_Walk]) -> None:
         walks = [walk for walk in walks if walk.jacobian is None]
         moved = [walk.moved() for walk in walks]
         responses = self._at(walks, [vectors for vectors, _ in moved])
@@ -216,7 +244,7 @@ class Fitter:
                 walk.jacobian[:, index] = (response - walk.predicted) / step
             walk.active = walk.active and bool(np.all(np.isfinite(walk.jacobian)))
 
-    def _take(self, walk, vector, predicted, point) -> bool:
+    def _take(self, walk: _Walk, vector: np.ndarray, predicted: np.ndarray, point: Point) -> bool:
         """Move a walk to a vector if that is better."""
         if not np.all(np.isfinite(predicted)):
             return False
@@ -236,6 +264,7 @@ class Fitter:
         """
         mean, spread = ParameterVector(fit.effects, self.problem.kind).prior()
         away = (fit.vector - mean) / spread
+        points: Iterable[Point]
         prior = -0.5 * float(away @ away) - float(np.sum(np.log(spread)))
         if fit.covariance is None:
             best, points = dataclasses.replace(fit, log_evidence=-np.inf), self.covariance.points
@@ -262,9 +291,9 @@ class Fitter:
             fit, covariance=own, judged=0, log_evidence=-np.inf))
 
     def refined(self, fit: Fit) -> Fit:
-        """Fit the covariance to what a fit leaves, then the effects under it once more."""
+        """Fit the covariance to the residual of a fit, then the effects under it once more."""
         own = fit.covariance or self.covariance
-        values = own.fit(self.problem.measured - fit.predicted, fit.point.values)
+        values = own.fit(self.problem.measured - fit.predicted, fit.require_point().values)
         self.covariance.add(values)
         point = own.point(values)
         better = self.fit([fit.effects], point, steps=3) if len(fit.vector) else []
@@ -296,12 +325,12 @@ class Fitter:
         step = self._step(fit, walk, np.ones(len(fit.predicted), dtype=bool))
         return min(self.error(fit.predicted), self.error(fit.predicted + fit.jacobian @ step))
 
-    def with_intervals(self, fit: Fit, factor: float = FACTOR) -> list:
+    def with_intervals(self, fit: Fit, factor: float = FACTOR) -> list[Effect]:
         """Return the fitted effects with 95 % intervals of their parameters."""
         half = factor * np.sqrt(np.maximum(np.diag(fit.spread), 0.0))
         return ParameterVector(fit.effects, self.problem.kind).with_intervals(fit.vector, half)
 
-    def cross_validate(self, fits) -> list[Fit]:
+    def cross_validate(self, fits: Iterable[Fit]) -> list[Fit]:
         """
         Return fits with the response of every row as predicted by a fit to the other folds.
 
@@ -313,7 +342,7 @@ class Fitter:
         for fit in fits:
             walk = _Walk(fit.effects, self.problem.kind)
             walk.vector = fit.vector
-            own = []
+            own: list[np.ndarray] = []
             for fold in folds if len(fit.vector) else ():
                 step = self._step(fit, walk, self.problem.fold != fold)
                 own += [np.clip(fit.vector + part * step, walk.parameters.lower,
@@ -333,7 +362,7 @@ class Fitter:
             found.append(dataclasses.replace(fit, held_out=held_out))
         return found
 
-    def _step(self, fit, walk, train):
+    def _step(self, fit: Fit, walk: _Walk, train: np.ndarray) -> np.ndarray:
         """Return the Gauss-Newton step towards the rows to train on, shape (k,)."""
         # Rows held out get no say; under the covariance of all rows that is a large noise.
         jacobian, residual = (fit.jacobian[train],

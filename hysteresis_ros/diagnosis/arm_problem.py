@@ -6,22 +6,30 @@ Effects judged on runs of an arm, with the weights that the bench gave, frozen.
 Refitted weights would absorb most of what an effect does.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 import os
+from typing import Literal, TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.diagnosis.discrepancy import Offset
+from hysteresis_ros.effects import Effect
 from hysteresis_ros.identification.operators import preisach_rows
 from hysteresis_ros.operators import Preisach
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import MuscleModel
 
 
 class ArmProblem(Problem):
     """Arm runs, simulated with the frozen weights of the bench."""
 
-    refits = False
+    refits: Literal[False] = False
 
-    def simulate(self, effects, train=None) -> np.ndarray:
+    def simulate(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> np.ndarray:
         """
         Return the simulated response of the judged rows, shape (n,).
 
@@ -34,7 +42,7 @@ class ArmProblem(Problem):
         """
         return self.pick([simulator.run(effects) for simulator in self.simulators])
 
-    def simulate_many(self, sets) -> np.ndarray:
+    def simulate_many(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
         """
         Return the simulated response of the judged rows for sets of effects.
 
@@ -52,11 +60,11 @@ class ArmProblem(Problem):
                 for simulator, rows in zip(self.simulators, self.chosen)]
         return np.concatenate(runs, axis=1)
 
-    def completed(self, effects):
+    def completed(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return the model with these effects."""
         return self.model.with_effects(effects)
 
-    def weight_columns(self, effects) -> np.ndarray:
+    def weight_columns(self, effects: Sequence[Effect]) -> np.ndarray:
         """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""
         stage = self.model.length_stage
         if not isinstance(stage, Preisach):

@@ -8,7 +8,11 @@ something unknown acts as well, whose probability beforehand is that of any effe
 probability is that of an unknown cause. So is the probability of something that happened once.
 """
 
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
 import math
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +20,12 @@ from hysteresis_ros.diagnosis import events, significance, verdict
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.residual import unexplained_signal
 from hysteresis_ros.diagnosis.selection import Selection
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.settings import Settings
+    from hysteresis_ros.workers import Progress
 
 # A drive that moves over less than this share of its range excites nothing.
 LEAST_DRIVE = 0.05
@@ -29,7 +38,8 @@ RESEMBLES = 0.6
 MOST_ALTERNATIVES = 3
 
 
-def arm_verdict(problem, settings, rng, progress) -> verdict.Diagnosis:
+def arm_verdict(problem: ArmProblem, settings: Settings, rng: np.random.Generator,
+                progress: Progress) -> verdict.Diagnosis:
     """
     Diagnose runs of an arm.
 
@@ -39,6 +49,11 @@ def arm_verdict(problem, settings, rng, progress) -> verdict.Diagnosis:
     settings : Settings
     rng : numpy.random.Generator
     progress : callable
+        ``progress(items, total)``, for a progress bar.
+
+    Returns
+    -------
+    Diagnosis
     """
     selection = Selection(problem, settings, rng, progress)
     selection.run()
@@ -48,19 +63,19 @@ def arm_verdict(problem, settings, rng, progress) -> verdict.Diagnosis:
 class _Verdict:
     """What follows from a selection."""
 
-    def __init__(self, selection):
+    def __init__(self, selection: Selection) -> None:
         self.selection = selection
         self.problem, self.fitter = selection.problem, selection.fitter
         self.settings = selection.settings
 
     def sum_up(self) -> verdict.Diagnosis:
-        """Judge what is left, and put all together."""
+        """Judge the residual, and put all together."""
         selection, problem = self.selection, self.problem
         valid = selection.valid()
         event, event_log = events.most_probable(problem, selection)
         shares = self._probabilities(valid, event_log)
         unknown = shares.pop('unknown') > 0.5
-        chosen = frozenset() if unknown else max(shares, key=shares.get)
+        chosen = frozenset() if unknown else max(shares, key=shares.__getitem__)
         best = valid[0] if valid else frozenset()
         unobservable = {**selection.unobservable, **self._too_weak()}
         resembles = self._resembles(best) if unknown else []
@@ -75,7 +90,7 @@ class _Verdict:
             verdict=kind, missing=missing,
             alternatives=[alternatives[name] for name in missing],
             ranking=self._ranking(missing, before), sets=self._sets(shares, unknown),
-            noise_floor=selection.fits[chosen].point.noise,
+            noise_floor=selection.fits[chosen].require_point().noise,
             structural_error=selection.covariance.size,
             unexplained=self._unexplained(chosen),
             experiment=verdict.next_experiment(
@@ -86,16 +101,17 @@ class _Verdict:
             signal=unexplained_signal(problem, problem.measured - selection.fits[
                 chosen].predicted) if unknown else '')
 
-    def _in_order(self, effects):
+    def _in_order(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return effects, that first which explains most by itself."""
-        def alone(effect):
+        def alone(effect: Effect) -> float:
             return self.selection.error(frozenset([effect.id]))
         return sorted(effects, key=alone)
 
-    def _log_mass(self, valid) -> float:
+    def _log_mass(self, valid: Iterable[frozenset[str]]) -> float:
         return max((self.selection.log_posterior(names) for names in valid), default=-np.inf)
 
-    def _probabilities(self, valid, event_log) -> dict:
+    def _probabilities(self, valid: Sequence[frozenset[str]], event_log: float
+                       ) -> dict[Any, float]:
         """Return the posterior probability of each set, and of 'unknown'."""
         # What does not suffice needs one cause more, as improbable as any other effect. Drift and
         # discrepancy stand for that cause, and are no evidence against a set that does suffice.
@@ -119,16 +135,17 @@ class _Verdict:
         return {**{names: value / total for names, value in known.items()},
                 'unknown': unknown / total}
 
-    def _sets(self, shares, unknown) -> list:
-        rows = [{'effects': sorted(names), 'probability': float(share),
-                 'rmse': self.selection.error(names)}
-                for names, share in shares.items() if share >= 1e-3]
+    def _sets(self, shares: dict[frozenset[str], float], unknown: bool) -> list[dict[str, Any]]:
+        rows: list[dict[str, Any]] = [
+            {'effects': sorted(names), 'probability': float(share),
+             'rmse': self.selection.error(names)}
+            for names, share in shares.items() if share >= 1e-3]
         rest = 1.0 - sum(row['probability'] for row in rows)
         rows.append({'effects': ['unknown'], 'probability': float(max(rest, 0.0)),
                      'rmse': self.selection.error(frozenset())})
         return sorted(rows, key=lambda row: -row['probability'])
 
-    def _known(self, chosen, unobservable) -> str:
+    def _known(self, chosen: frozenset[str], unobservable: Collection[str]) -> str:
         if chosen:
             return 'missing'
         names = self.selection.names
@@ -139,17 +156,18 @@ class _Verdict:
             return 'not_excited'
         return 'adequate'
 
-    def _unexplained(self, chosen) -> float:
+    def _unexplained(self, chosen: frozenset[str]) -> float:
         """Share of the first mean square that neither set nor base model nor noise explains."""
         selection = self.selection
-        beyond = selection.structure(chosen) ** 2 - selection.limit ** 2
+        beyond = selection.noise_free_rmse(chosen) ** 2 - selection.rmse_95 ** 2
         first = selection.error(frozenset()) ** 2
         return float(np.clip(beyond / max(first, 1e-300), 0.0, 1.0))
 
-    def _alternatives(self, chosen, valid) -> dict:
+    def _alternatives(self, chosen: frozenset[str], valid: Sequence[frozenset[str]]
+                      ) -> dict[str, list[str]]:
         """For each effect of the answer, name those that could as well be in its place."""
         selection = self.selection
-        found: dict[str, list] = {name: [] for name in chosen}
+        found: dict[str, list[str]] = {name: [] for name in chosen}
         if not chosen:
             return found
         for name in chosen:
@@ -168,7 +186,7 @@ class _Verdict:
                     found[place].append(other)
         return found
 
-    def _resembles(self, best) -> list:
+    def _resembles(self, best: frozenset[str]) -> list[str]:
         """Name the effects of an implausible set that explains far more than the best one."""
         selection = self.selection
         sets = [names for names, fit in selection.fits.items()
@@ -178,7 +196,7 @@ class _Verdict:
             return []
         return sorted(names)
 
-    def _too_weak(self) -> dict:
+    def _too_weak(self) -> dict[str, str]:
         """Effects that even at the upper end of their range would not stand out here."""
         selection, kind = self.selection, self.problem.kind
         strongest = []
@@ -191,9 +209,9 @@ class _Verdict:
         sizes = np.sqrt(np.mean(changes ** 2, axis=1))
         return {name: 'even a strong one would change less than the noise'
                 for name, size in zip(selection.names, sizes)
-                if np.isfinite(size) and size < LEAST_CHANGE * selection.limit}
+                if np.isfinite(size) and size < LEAST_CHANGE * selection.rmse_95}
 
-    def _ranking(self, missing, before) -> list:
+    def _ranking(self, missing: Sequence[str], before: float) -> list[dict[str, Any]]:
         selection, problem = self.selection, self.problem
         alone = [fit for names, fit in selection.fits.items() if len(names) == 1]
         if not alone:

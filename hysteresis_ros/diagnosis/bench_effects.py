@@ -2,27 +2,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects that belong to the bench model: found in its own tables, or named by the user."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.extend import extended_model
-from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, measure
 
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.workers import Progress
 
-def _silent(iterable, total):
-    return iterable
+
+def _silent(items: Iterable, total: int) -> Iterable:
+    return items
 
 
-def add_effects(model, length, force=None, names=None, length_trials=None, force_trials=None,
-                jobs: int = 1, progress=_silent):
+def add_effects(model: MuscleModel, length: Measurement, force: Measurement | None = None,
+                names: Sequence[str] | None = None, length_trials: Sequence[float] | None = None,
+                force_trials: Sequence[float] | None = None, jobs: int = 1,
+                progress: Progress = _silent) -> tuple[MuscleModel, list[Effect]]:
     """
     Add effects to an identified model and refit H2's weights with them.
 
@@ -40,7 +51,7 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
     jobs : int
         Processes.
     progress : callable
-        ``progress(iterable, total)``, for a progress bar.
+        ``progress(items, total)``, for a progress bar.
 
     Returns
     -------
@@ -51,7 +62,11 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
     Raises
     ------
     IdentificationError
-        If a trial is not in the table.
+        If a trial is not in the table, or none is left to fit.
+    MeasurementError
+        If the table has too few rows, or the length stage is none of Preisach's.
+    ParameterError
+        If an effect is unknown, named twice, already there, or cannot show in a bench table.
     """
     rows = choose_trials(length, length_trials, 'length')
     if not rows.any():
@@ -64,13 +79,13 @@ def add_effects(model, length, force=None, names=None, length_trials=None, force
         return model, []
     extended, added = extended_model(model, names, [fitted])
     metrics = measure(extended, force, force_trials, length, length_trials)
-    # What was left out of the last fit of the weights stays beside the new errors.
+    # The errors of loads left out of the last fit of the weights stay with the new ones.
     for name, entry in metrics.items():
         metrics[name] = {**extended.metrics.get(name, {}), **entry}
     return dataclasses.replace(extended, metrics=metrics), added
 
 
-def _with_universal(model, found, fitted):
+def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measurement) -> list[str]:
     """
     Name the effects found, and those that every loaded muscle has where they do no harm.
 
@@ -78,7 +93,7 @@ def _with_universal(model, found, fitted):
     and few rows may not prove either; but on an arm the load moves while the wire does. What is
     known beforehand needs no proof against chance, only held-out rows that do not speak against it.
     """
-    fitter = BenchFitter(problem_for(model, [fitted]))
+    fitter = BenchFitter(BenchProblem(model, [fitted]))
     names = [effect.id for effect in found]
     rest = usual([kind(model.surroundings) for name, kind in catalogue().items()
                   if kind.universal and name not in names and kind.available(model.surroundings)],
@@ -86,16 +101,16 @@ def _with_universal(model, found, fitted):
     if not rest:
         return names
 
-    def held_out(effects):
+    def held_out(effects: Sequence[Effect]) -> float:
         fit = fitter.fit(effects)
         if fit.implausible():
             return np.inf
         return fitter.error(fitter.cross_validate(fit).held_out)
 
-    # Alone they have to help; beside one that was found they only must not harm.
+    # Alone they have to help; together with one that was found they only must not harm.
     practical = Settings().practical
-    limit = held_out(found) * ((1.0 + practical) if names else (1.0 - practical))
+    largest = held_out(found) * ((1.0 + practical) if names else (1.0 - practical))
     for more in (rest, *([effect] for effect in rest)):
-        if held_out([*found, *more]) <= limit:
+        if held_out([*found, *more]) <= largest:
             return [*names, *(effect.id for effect in more)]
     return names

@@ -2,7 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fit the parameters of effects to bench tables, and test the fit on rows that were held out."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import special    # its stats take a second to import
@@ -10,7 +14,11 @@ from scipy import special    # its stats take a second to import
 from hysteresis_ros.diagnosis.arm_fit import DIFFERENCE, Fit
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.effects import Effect
 from hysteresis_ros.identification.gauss_newton import minimise
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.bench_problem import BenchProblem, Solution
 
 # Starts that are followed for a few steps after all were tried once, if their mean square error is
 # not larger than the best's by this factor; the best goes on.
@@ -37,16 +45,19 @@ class Response:
         Rows that weights and parameters are fitted to; all by default.
     """
 
-    def __init__(self, problem, fixed, effects, rows=None):
+    def __init__(self, problem: BenchProblem, fixed: Sequence[Effect], effects: Sequence[Effect],
+                 rows: np.ndarray | None = None) -> None:
         self.problem, self.rows = problem, rows
         self.parameters = ParameterVector(effects, problem.kind)
         self._fixed = unaffected(fixed, effects)
-        self._fitted = slice(None) if rows is None else rows
+        self._fitted: slice | np.ndarray = slice(None) if rows is None else rows
         self._scale = max(float(np.std(problem.measured)), 1e-12)
         self._alone = [ParameterVector([effect], problem.kind) for effect in effects]
-        self._values, self._solutions, self._derivatives = {}, {}, {}
+        self._values: dict[tuple[int, bytes], Effect] = {}
+        self._solutions: dict[bytes, Solution] = {}
+        self._derivatives: dict[bytes, np.ndarray] = {}
 
-    def minimise(self, start, evaluations: int, tolerance: float) -> np.ndarray:
+    def minimise(self, start: np.ndarray, evaluations: int, tolerance: float) -> np.ndarray:
         """Return the vector (k,) of least squares near a start."""
         if len(start) == 0:
             return start
@@ -56,16 +67,16 @@ class Response:
             lambda vector: self.jacobian(vector)[self._fitted] / self._scale,
             start, self.parameters.lower, self.parameters.upper, evaluations, tolerance)
 
-    def fit(self, vector) -> Fit:
+    def fit(self, vector: np.ndarray) -> Fit:
         """Return the effects with the values of a vector (k,), and what they predict."""
         return Fit(self.parameters.with_vector(vector), vector, self.predicted(vector),
                    self.jacobian(vector))
 
-    def predicted(self, vector) -> np.ndarray:
+    def predicted(self, vector: np.ndarray) -> np.ndarray:
         """Return the response of all rows, shape (n,)."""
         return self._solution(vector).predicted
 
-    def jacobian(self, vector) -> np.ndarray:
+    def jacobian(self, vector: np.ndarray) -> np.ndarray:
         """Return the derivatives of the response, shape (n, k)."""
         key = vector.tobytes()
         if key not in self._derivatives:
@@ -74,20 +85,20 @@ class Response:
                 (len(self.problem.measured), 0))
         return self._derivatives[key]
 
-    def _solution(self, vector):
+    def _solution(self, vector: np.ndarray) -> Solution:
         key = vector.tobytes()
         if key not in self._solutions:
             self._solutions[key] = self.problem.solve(self._effects(vector), self.rows)
         return self._solutions[key]
 
-    def _derivative(self, vector, index):
+    def _derivative(self, vector: np.ndarray, index: int) -> np.ndarray:
         solution, moved = self._solution(vector), np.array(vector)
         inside = vector[index] + DIFFERENCE < self.parameters.upper[index]
         moved[index] += DIFFERENCE if inside else -DIFFERENCE
         near = self.problem.near(solution, self._effects(moved), self.rows)
         return (near - solution.predicted) / (moved[index] - vector[index])
 
-    def _effects(self, vector):
+    def _effects(self, vector: np.ndarray) -> list[Effect]:
         """Return all effects; one that did not move is made once."""
         found, begin = list(self._fixed), 0
         for number, alone in enumerate(self._alone):
@@ -110,11 +121,11 @@ class BenchFitter:
         Rows.
     """
 
-    def __init__(self, problem):
+    def __init__(self, problem: BenchProblem) -> None:
         self.problem = problem
         self.fixed = list(problem.model.effects)
 
-    def fit(self, effects, evaluations: int = MOST_EVALUATIONS,
+    def fit(self, effects: Sequence[Effect], evaluations: int = MOST_EVALUATIONS,
             tolerance: float = TOLERANCE) -> Fit:
         """
         Fit from the present values of `effects`, by least squares within their bounds.
@@ -124,7 +135,7 @@ class BenchFitter:
         effects : sequence of Effect
             Effects to fit; their values are the start.
         evaluations : int
-            Responses that the optimiser looks at, at most.
+            Responses that the optimiser evaluates, at most.
         tolerance : float
             A step that lowers the sum of squares by a smaller share is the last.
         """
@@ -132,20 +143,20 @@ class BenchFitter:
         return response.fit(response.minimise(
             response.parameters.vector(), evaluations, tolerance))
 
-    def search(self, known, effect) -> Fit:
+    def search(self, known: Sequence[Effect], effect: Effect) -> Fit:
         """
         Fit one more effect together with the `known` ones, from its best starts.
 
         Parameters
         ----------
         known : sequence of Effect
-            Effects found before, fitted again beside the new one.
+            Effects found before, fitted again together with the new one.
         effect : Effect
             The new one.
         """
         starts = starts_of(effect, self.problem.kind, self.problem.measured)
-        kept = [*unaffected(self.fixed, [*known, starts[0]]), *known]
-        errors = [self.error(self.problem.simulate([*kept, start])) ** 2 for start in starts]
+        others = [*unaffected(self.fixed, [*known, starts[0]]), *known]
+        errors = [self.error(self.problem.simulate([*others, start])) ** 2 for start in starts]
         # Starts without any effect, such as stops out of reach, all have the same error.
         spread = max(float(np.var(self.problem.measured)), 1e-300)
         _, order = np.unique(np.round(np.array(errors) / spread, SAME), return_index=True)
@@ -153,9 +164,9 @@ class BenchFitter:
                     if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
         return self.best_of([[*known, start] for start in followed])
 
-    def best_of(self, starts) -> Fit:
+    def best_of(self, starts: Sequence[Sequence[Effect]]) -> Fit:
         """Follow several starts, each a list of effects, for a few steps, and fit the best."""
-        begun = []
+        begun: list[tuple[float, int, Response, np.ndarray]] = []
         for effects in starts:
             response = Response(self.problem, self.fixed, effects)
             vector = response.minimise(
@@ -164,8 +175,8 @@ class BenchFitter:
         _, _, response, vector = min(begun)
         return response.fit(response.minimise(vector, MOST_EVALUATIONS, TOLERANCE))
 
-    def error(self, predicted) -> float:
-        """Return the root mean square error of a response."""
+    def error(self, predicted: np.ndarray) -> float:
+        """Return the root mean square error of a response (n,), in its unit."""
         return float(np.sqrt(np.mean((self.problem.measured - predicted) ** 2)))
 
     def cross_validate(self, fit: Fit) -> Fit:
@@ -178,7 +189,7 @@ class BenchFitter:
             held_out[test] = response.predicted(vector)[test]
         return dataclasses.replace(fit, held_out=held_out)
 
-    def with_intervals(self, fit: Fit, level: float = 0.95) -> list:
+    def with_intervals(self, fit: Fit, level: float = 0.95) -> list[Effect]:
         """
         Return the fitted effects with intervals of their parameters.
 

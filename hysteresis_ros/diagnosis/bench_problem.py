@@ -7,12 +7,16 @@ A bench table is where the weights come from, so every set of effects gets weigh
 fitted to the rows that are not held out.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 import dataclasses
+from typing import Any, Literal, TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.problem import Problem
-from hysteresis_ros.effects import SensorEffect
+from hysteresis_ros.effects import Effect, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench import left_out
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
@@ -21,6 +25,15 @@ from hysteresis_ros.identification.projection import ProjectedWeights
 from hysteresis_ros.kernels.shares import shares
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.operators import Preisach, cell_areas
+
+if TYPE_CHECKING:
+    from hysteresis_ros.identification.weight_fit import WeightFit
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.model.first_stage import FirstStage
+    from hysteresis_ros.operators import HysteresisOperator
+
+Entry = TypeVar('Entry')
 
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
 # the solution is unique. More of it bends the effects' own parameters.
@@ -60,7 +73,7 @@ class Solution:
 
     weights: ProjectedWeights
     predicted: np.ndarray
-    phases: list | None
+    phases: list[np.ndarray] | None
 
 
 @dataclasses.dataclass
@@ -71,7 +84,7 @@ class Course:
     `scales` and `known` (rows,) multiply the output above its least and are added to it.
     """
 
-    excitation: 'Excitation'
+    excitation: Excitation
     scales: np.ndarray
     known: np.ndarray
 
@@ -92,10 +105,11 @@ class Excitation:
         Inputs whose output is judged.
     """
 
-    def __init__(self, inputs, ends, wanted):
+    def __init__(self, inputs: np.ndarray, ends: np.ndarray, wanted: np.ndarray) -> None:
         self.inputs = inputs
         self._ends, self._wanted = ends, wanted
-        self._nodes, self._shares = {}, {}
+        self._nodes: dict[int, np.ndarray] = {}
+        self._shares: dict[int, np.ndarray] = {}
 
     def nodes(self, levels: int) -> np.ndarray:
         """Return a grid of equal intervals over the inputs, shape (levels + 1,)."""
@@ -105,7 +119,8 @@ class Excitation:
             self._nodes[levels] = np.linspace(low - margin, high + margin, levels + 1)
         return self._nodes[levels]
 
-    def shares(self, levels: int, scale: np.ndarray, columns=None) -> np.ndarray:
+    def shares(self, levels: int, scale: np.ndarray, columns: np.ndarray | None = None
+               ) -> np.ndarray:
         """
         Return what `kernels.shares` does, of all columns or of some that end with the bias.
 
@@ -131,9 +146,9 @@ class Excitation:
 class BenchProblem(Problem):
     """Bench tables, with weights refitted to the training rows for every set of effects."""
 
-    refits = True
+    refits: Literal[True] = True
 
-    def __init__(self, model, measurements):
+    def __init__(self, model: MuscleModel, measurements: Sequence[Measurement]) -> None:
         super().__init__(model, measurements)
         stage = model.require_length_stage()
         if not isinstance(stage, Preisach):
@@ -155,12 +170,16 @@ class BenchProblem(Problem):
         self._wanted[self._judged + np.repeat(np.arange(1, len(counts) + 1), counts)[
             self._judged]] = True
         self._surroundings = model.surroundings
-        self._passive = {}
-        self._courses, self._excitations = {}, {}
-        self._square = None
-        self._phases_of = self._known_phases = None
+        self._passive: dict[bytes | None, np.ndarray] = {}
+        self._courses: dict[tuple, Course] = {}
+        self._excitations: dict[tuple, Excitation] = {}
+        self._square: np.ndarray | None = None
+        self._phases_of: tuple | None = None
+        self._known_phases: list[np.ndarray] = []
 
-    def _design(self, effects, levels=None, train=None, phases=None, columns=None) -> Design:
+    def _design(self, effects: Sequence[Effect], levels: int | None = None,
+                train: np.ndarray | None = None, phases: list[np.ndarray] | None = None,
+                columns: np.ndarray | None = None) -> Design:
         if phases is None and any(effect.needs_phase for effect in effects):
             phases = self._phases(effects, train)
         course = self._course(effects, phases)
@@ -169,7 +188,7 @@ class BenchProblem(Problem):
         return Design(course.excitation.shares(levels, scale, columns), known,
                       course.excitation.nodes(levels))
 
-    def _course(self, effects, phases) -> Course:
+    def _course(self, effects: Sequence[Effect], phases: list[np.ndarray] | None) -> Course:
         key = tuple((effect.id, *effect.values.values()) for effect in effects)
         if phases is not None or key not in self._courses:
             course = self._new_course(Chain(effects, self._surroundings), phases)
@@ -179,9 +198,10 @@ class BenchProblem(Problem):
             _remember(self._courses, key, course)
         return self._courses[key]
 
-    def _new_course(self, chain, phases) -> Course:
+    def _new_course(self, chain: Chain, phases: list[np.ndarray] | None) -> Course:
         load, cold = self._load, chain.to_drive_squared(self.model.cold_drive)
-        driven, drifts = [], []
+        driven: list[Any] = []
+        drifts: list[tuple[np.ndarray, np.ndarray]] = []
         for number, trial in enumerate(self._trials):
             inputs = trial.inputs
             if phases is not None:
@@ -194,7 +214,7 @@ class BenchProblem(Problem):
         return Course(self._excitation(chain, np.concatenate(driven)),
                       chain.scale(load) * factor + 0.0 * load, chain.stretch(load) + offset)
 
-    def _excitation(self, chain, squared) -> Excitation:
+    def _excitation(self, chain: Chain, squared: np.ndarray) -> Excitation:
         """Return what H2 is given for the drive squared of all trials, shape (rows + trials,)."""
         inside = chain.load_inside(self._load)
         key = squared.tobytes(), inside.tobytes(), chain.load_per_drive_squared()
@@ -207,7 +227,7 @@ class BenchProblem(Problem):
                       Excitation(self.model.sign * x, self._ends, self._wanted))
         return self._excitations[key]
 
-    def _first(self, first, squared):
+    def _first(self, first: FirstStage, squared: np.ndarray) -> np.ndarray:
         """Return x for the drive squared of all trials, each from the cold state."""
         x, begin = np.empty(len(squared)), 0
         for end in self._ends:
@@ -216,7 +236,7 @@ class BenchProblem(Problem):
             begin = end
         return x
 
-    def _phases(self, effects, train) -> list:
+    def _phases(self, effects: Sequence[Effect], train: np.ndarray | None) -> list[np.ndarray]:
         """
         Return the martensite share in every row of each trial.
 
@@ -234,7 +254,8 @@ class BenchProblem(Problem):
             self._phases_of = key
         return self._known_phases
 
-    def _phases_with(self, effects, stage, phases=None) -> list:
+    def _phases_with(self, effects: Sequence[Effect], stage: HysteresisOperator,
+                     phases: list[np.ndarray] | None = None) -> list[np.ndarray]:
         """Return the martensite share that H2 shows in every row of each trial."""
         model = dataclasses.replace(self.model, length_stage=stage)
         found = []
@@ -245,7 +266,7 @@ class BenchProblem(Problem):
             found.append(model.martensite(stage.simulate(part[1:])))
         return found
 
-    def fit_stage(self, effects, levels):
+    def fit_stage(self, effects: Sequence[Effect], levels: int) -> tuple[WeightFit, Design]:
         """
         Fit H2's weights to all rows, their regularisation cross-validated over the trials.
 
@@ -276,13 +297,13 @@ class BenchProblem(Problem):
                     effects, _stage(design.nodes, fit.weights, fit.bias), phases)
         return fit, design
 
-    def simulate(self, effects, train=None) -> np.ndarray:
+    def simulate(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> np.ndarray:
         """Return the response of the judged rows, shape (n,), weights fitted to `train` (n,)."""
         return self.solve(effects, train).predicted
 
-    def solve(self, effects, train=None) -> Solution:
+    def solve(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> Solution:
         """
-        Fit H2's weights beside effects.
+        Fit H2's weights with effects as they are.
 
         Parameters
         ----------
@@ -298,7 +319,8 @@ class BenchProblem(Problem):
         weights = self._projected(design, train)
         return Solution(weights, self._response(effects, design, weights.z), phases)
 
-    def near(self, solution, effects, train=None) -> np.ndarray:
+    def near(self, solution: Solution, effects: Sequence[Effect],
+             train: np.ndarray | None = None) -> np.ndarray:
         """
         Return the response for effects that differ a little from those of a solution.
 
@@ -316,19 +338,19 @@ class BenchProblem(Problem):
         z = solution.weights.moved(*self._rows(design, train))
         return self._response(effects, design, z)
 
-    def _response(self, effects, design, z):
+    def _response(self, effects: Sequence[Effect], design: Design, z: np.ndarray) -> np.ndarray:
         response = design.shares @ z + design.known
         for effect in effects:
             if isinstance(effect, SensorEffect):
                 response = self._sensed(effect, response)
         return response
 
-    def _rows(self, design, train):
+    def _rows(self, design: Design, train: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Return design and target of the training rows."""
         target = self.measured - design.known
         return (design.shares, target) if train is None else (design.shares[train], target[train])
 
-    def _projected(self, design, train):
+    def _projected(self, design: Design, train: np.ndarray | None) -> ProjectedWeights:
         # Neighbouring parameters have neighbouring weights.
         key = None if train is None else train.tobytes()
         found = ProjectedWeights(*self._rows(design, train), self._penalty(design.nodes),
@@ -336,14 +358,14 @@ class BenchProblem(Problem):
         self._passive[key] = found.passive
         return found
 
-    def _penalty(self, nodes):
+    def _penalty(self, nodes: np.ndarray) -> np.ndarray:
         """Square of the penalty; it is the same for all grids of equal intervals."""
         if self._square is None:
             root = smoothness(nodes, reversible=True)
             self._square = np.pad(SEARCH_STRENGTH * root.T @ root, (0, 1))
         return self._square
 
-    def _sensed(self, effect, response):
+    def _sensed(self, effect: SensorEffect, response: np.ndarray) -> np.ndarray:
         sensed = response.copy()
         for trial in np.unique(self.trial):
             rows = self.trial == trial
@@ -352,23 +374,24 @@ class BenchProblem(Problem):
             sensed[rows] = effect.forward(response[rows], inputs)
         return sensed
 
-    def weight_columns(self, effects) -> np.ndarray:
+    def weight_columns(self, effects: Sequence[Effect]) -> np.ndarray:
         """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""
         return self._design(effects).rows
 
-    def completed(self, effects):
+    def completed(self, effects: Sequence[Effect]) -> MuscleModel:
         """
         Return the model with these effects and H2's weights refitted to all rows.
 
         What the effects explain no longer has to be smoothed over, so that the grid may be finer
         where held-out rows say so.
         """
-        best = None
+        best: tuple[WeightFit, Design] | None = None
         for factor in FINER:
             fit, design = self.fit_stage(effects, round(factor * self.levels))
             if best is not None and fit.held_out_rmse > (1.0 - WORTH) * best[0].held_out_rmse:
                 break
             best = fit, design
+        assert best is not None     # there is at least one factor
         fit, design = best
         stage = _stage(design.nodes, fit.weights, fit.bias)
         metrics = dict(self.model.metrics)
@@ -377,19 +400,19 @@ class BenchProblem(Problem):
             self.model, effects=list(effects), length_stage=stage, metrics=metrics)
 
 
-def _remember(found, key, value):
+def _remember(found: dict[tuple, Entry], key: tuple, value: Entry) -> None:
     """Add an entry to a dict of the latest ones."""
     found[key] = value
     if len(found) > MOST_COURSES:
         del found[next(iter(found))]
 
 
-def _stage(nodes, weights, bias):
+def _stage(nodes: np.ndarray, weights: np.ndarray, bias: float) -> Preisach:
     """Return the operator with weights of shape (K + N,); `bias` is its least output."""
     count = len(cell_areas(nodes))
     return Preisach(nodes, weights[:count], bias + float(weights @ _scale(nodes)), weights[count:])
 
 
-def _scale(nodes):
+def _scale(nodes: np.ndarray) -> np.ndarray:
     """Sizes of the cells and, for the reversible weights, of the intervals, shape (K + N,)."""
     return np.append(cell_areas(nodes), np.diff(nodes))

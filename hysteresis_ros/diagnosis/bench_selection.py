@@ -8,8 +8,12 @@ are not negative, which no Gaussian evidence knows; what a set predicts of trial
 nor its weights have seen takes the evidence's place.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 import itertools
 import math
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +22,13 @@ from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.observable import observable, present
 from hysteresis_ros.diagnosis.parameters import usual
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.workers import delayed, in_parallel
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.bench_problem import BenchProblem
+    from hysteresis_ros.diagnosis.settings import Settings
+    from hysteresis_ros.workers import Progress
 
 SIGNIFICANCE = 0.05
 # Share of blocks in which an effect has to help.
@@ -51,13 +60,14 @@ class BenchSelection:
         Every effect by itself, best first.
     sets : list of Fit
         Sets that explain more than chance, with plausible values.
-    p_values : dict of tuple to float
+    p_values : dict of tuple of str to float
         Of every set that was tried, by its names; family-wise.
     unobservable : dict of str to str
         Effects that this data cannot show, with the reason.
     """
 
-    def __init__(self, problem, settings, rng, jobs, progress):
+    def __init__(self, problem: BenchProblem, settings: Settings, rng: np.random.Generator,
+                 jobs: int, progress: Progress) -> None:
         self.problem, self.settings = problem, settings
         self.fitter = BenchFitter(problem)
         self._rng, self._jobs, self._progress = rng, jobs, progress
@@ -66,7 +76,7 @@ class BenchSelection:
         self.alone: list[Fit] = []
         self.sets: list[Fit] = []
         self.tried: list[Fit] = []
-        self.p_values: dict[tuple, float] = {}
+        self.p_values: dict[tuple[str, ...], float] = {}
 
     def run(self) -> None:
         """Fit every effect by itself, and all sets of the best few."""
@@ -84,48 +94,49 @@ class BenchSelection:
         if not self.sets:
             return
         best = min(map(self.error, self.sets))
-        enough = [fit for fit in self.sets
-                  if self.error(fit) <= (1.0 + self.settings.practical) * best]
-        self.found = min(enough, key=lambda fit: (
+        near_best = [fit for fit in self.sets
+                     if self.error(fit) <= (1.0 + self.settings.practical) * best]
+        self.found = min(near_best, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.error(fit)))
 
-    def _in_parallel(self, task, items) -> list[Fit]:
+    def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None],
+                     items: Sequence) -> list[Fit]:
         tasks = [delayed(task)(self.fitter, item) for item in items]
         results = self._progress(in_parallel(tasks, self._jobs), len(tasks))
         fits = [fit for fit in results if fit is not None]
         return [fit for fit in fits if np.all(np.isfinite(fit.held_out))]
 
-    def error(self, fit) -> float:
-        """Return the held-out RMSE of a fit."""
+    def error(self, fit: Fit) -> float:
+        """Return the held-out RMSE of a fit, in the unit of the response."""
         return self.fitter.error(fit.held_out)
 
-    def _gains(self, fit):
+    def _gains(self, fit: Fit) -> np.ndarray:
         """Return the reduction of the squared error in each block."""
         before, after = (self.problem.measured - one.held_out for one in (self.base, fit))
         return significance.block_sums(before ** 2 - after ** 2, self.problem.block)
 
-    def _significance(self, fits) -> np.ndarray:
+    def _significance(self, fits: Sequence[Fit]) -> np.ndarray:
         if not fits:
             return np.zeros(0)
         return significance.paired_p_values(
             np.stack([self._gains(fit) for fit in fits]), self._rng, self.settings.draws)
 
-    def _helps(self, fit) -> bool:
+    def _helps(self, fit: Fit) -> bool:
         """Whether a fit explains enough to matter, in most blocks."""
         return bool(self.error(fit) <= (1.0 - self.settings.practical) * self.error(self.base)
                     and np.mean(self._gains(fit) > 0.0) >= CONSISTENT)
 
-    def could_be(self, rival) -> bool:
+    def could_be(self, rival: Fit) -> bool:
         """Whether a rival could be the truth although the set found is better."""
         if self.error(rival) <= (1.0 + self.settings.practical) * self.error(self.found):
             return True
-        errors = [self.problem.measured - fit.held_out for fit in (rival, self.found)]
-        low, _ = significance.gain_interval(*errors, self.problem.block, self._rng)
+        theirs, own = (self.problem.measured - fit.held_out for fit in (rival, self.found))
+        low, _ = significance.gain_interval(theirs, own, self.problem.block, self._rng)
         return low <= 0.0
 
-    def alternatives(self) -> dict:
+    def alternatives(self) -> dict[str, list[str]]:
         """For each effect found, name those that could as well be in its place."""
-        found: dict[str, list] = {effect.id: [] for effect in self.found.effects}
+        found: dict[str, list[str]] = {effect.id: [] for effect in self.found.effects}
         chosen = frozenset(found)
         for rival in sorted(self.sets, key=self.error):
             names = frozenset(rival.names)
@@ -153,28 +164,28 @@ class BenchSelection:
         return list(zip(fits, (weights / weights.sum()).tolist()))
 
 
-def subsets(effects, most: int) -> list[list]:
-    """Return every set of at most `most` of the effects in which none contains another."""
+def subsets(effects: Sequence[Effect], most: int) -> list[list[Effect]]:
+    """Return every set of at most `most` of the effects in which none replaces another."""
     return [list(subset) for size in range(1, most + 1)
             for subset in itertools.combinations(effects, size)
             if not any(other.id in effect.replaces for effect in subset for other in subset)]
 
 
-def _alone(fitter, name):
+def _alone(fitter: BenchFitter, name: str) -> Fit | None:
     """Fit and cross-validate one effect."""
     effect = present(fitter.problem.model, catalogue()[name])
     with np.errstate(all='ignore'):
         return _finite(fitter, lambda: fitter.search([], effect))
 
 
-def _together(fitter, effects):
+def _together(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
     """Fit and cross-validate some effects, from usual values and from those that each had."""
     with np.errstate(all='ignore'):
         return _finite(fitter, lambda: fitter.best_of(
             [usual(effects, fitter.problem.kind), effects]))
 
 
-def _finite(fitter, make):
+def _finite(fitter: BenchFitter, make: Callable[[], Fit]) -> Fit | None:
     fit = make()
     if not np.all(np.isfinite(fit.predicted)) or not np.all(np.isfinite(fit.jacobian)):
         return None

@@ -2,11 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verdict on bench tables, from what sets of effects predict of held-out rows."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TYPE_CHECKING
+
 import numpy as np
 
 from hysteresis_ros.diagnosis import significance, verdict
 from hysteresis_ros.diagnosis.bench_selection import BenchSelection
 from hysteresis_ros.diagnosis.residual import shares, unexplained_signal
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.bench_problem import BenchProblem
+    from hysteresis_ros.diagnosis.settings import Settings
+    from hysteresis_ros.workers import Progress
 
 # More than this share of the first mean square left over means that the cause is not known.
 UNEXPLAINED = 0.3
@@ -18,7 +28,8 @@ LARGEST_ERROR = 0.15
 RESEMBLES = 0.6
 
 
-def bench_verdict(problem, settings, rng, jobs, progress) -> verdict.Diagnosis:
+def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Generator,
+                  jobs: int, progress: Progress) -> verdict.Diagnosis:
     """
     Diagnose bench tables.
 
@@ -28,8 +39,13 @@ def bench_verdict(problem, settings, rng, jobs, progress) -> verdict.Diagnosis:
     settings : Settings
     rng : numpy.random.Generator
     jobs : int
-        Processes.
+        Processes; -1 for all cores.
     progress : callable
+        ``progress(items, total)``, for a progress bar.
+
+    Returns
+    -------
+    Diagnosis
     """
     selection = BenchSelection(problem, settings, rng, jobs, progress)
     selection.run()
@@ -60,7 +76,7 @@ def bench_verdict(problem, settings, rng, jobs, progress) -> verdict.Diagnosis:
         signal=unexplained_signal(problem, residual) if unknown else '', resembles=resembles)
 
 
-def _unexplained(selection) -> float:
+def _unexplained(selection: BenchSelection) -> float:
     """Share of the first mean square that has structure, where that matters to a user."""
     problem, found = selection.problem, selection.found
     error = selection.fitter.error(found.predicted)
@@ -75,7 +91,7 @@ def _unexplained(selection) -> float:
     return explained * (error / selection.fitter.error(selection.base.predicted)) ** 2
 
 
-def _resembles(selection) -> list:
+def _resembles(selection: BenchSelection) -> list[str]:
     """Name the effects of an implausible set that explains far more than what was found."""
     found = selection.found
     implausible = [fit for fit in selection.tried
@@ -87,19 +103,22 @@ def _resembles(selection) -> list:
     return sorted(best.names)
 
 
-def _sets(selection, unknown) -> list:
+def _sets(selection: BenchSelection, unknown: bool) -> list[dict[str, Any]]:
     """Return the probabilities of sets; all of it is 'unknown' where the verdict is."""
-    rows = [{'effects': list(fit.names), 'probability': 0.0 if unknown else float(share),
-             'rmse': selection.error(fit)}
-            for fit, share in selection.probabilities() if share >= 1e-3]
+    rows: list[dict[str, Any]] = [
+        {'effects': list(fit.names), 'probability': 0.0 if unknown else float(share),
+         'rmse': selection.error(fit)}
+        for fit, share in selection.probabilities() if share >= 1e-3]
     rest = max(1.0 - sum(row['probability'] for row in rows), 0.0)
     rows.append({'effects': ['unknown'], 'probability': float(rest),
                  'rmse': selection.error(selection.base)})
     return sorted(rows, key=lambda row: -row['probability'])
 
 
-def _ranking(selection, missing, rng) -> list:
-    problem, base, rows = selection.problem, selection.base, []
+def _ranking(selection: BenchSelection, missing: Sequence[str], rng: np.random.Generator
+             ) -> list[dict[str, Any]]:
+    problem, base = selection.problem, selection.base
+    rows: list[dict[str, Any]] = []
     if not selection.alone:
         return rows
     for fit in selection.alone:

@@ -14,6 +14,8 @@ that neither noise nor autocorrelation is taken for an effect. Their priors are 
 one, because the bench says how large the discrepancy is, a is of its size or less (half-Cauchy).
 """
 
+from __future__ import annotations
+
 import copy
 import dataclasses
 
@@ -85,7 +87,8 @@ class Covariance:
         Covariances at hand; see `add`.
     """
 
-    def __init__(self, discrepancy, clock, trial, resolution: float, scale_spread: float):
+    def __init__(self, discrepancy: np.ndarray, clock: np.ndarray, trial: np.ndarray,
+                 resolution: float, scale_spread: float) -> None:
         self._discrepancy = discrepancy
         self._same = trial[:, None] == trial[None, :]
         self._gaps = np.where(self._same, np.abs(clock[:, None] - clock[None, :]), 0.0)
@@ -104,7 +107,7 @@ class Covariance:
         self._high = np.maximum(self._high, self._low)
         self.points: list[Point] = []
 
-    def of(self, discrepancy) -> 'Covariance':
+    def of(self, discrepancy: np.ndarray) -> Covariance:
         """Return covariances with another discrepancy (n, n), and none at hand."""
         other = copy.copy(self)
         other._discrepancy, other.points = discrepancy, []
@@ -115,12 +118,13 @@ class Covariance:
         return np.clip([0.0, np.log(max(drift * self._scale, _TINY)), self._middle,
                         np.log(max(noise * self._scale, self.resolution))], self._low, self._high)
 
-    def _parts(self, values):
+    def _parts(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return discrepancy and drift, each (n, n), and the variance of the noise."""
         drift = np.where(self._same, np.exp(-self._gaps / np.exp(values[2])), 0.0)
         drift *= np.exp(2.0 * values[1])
         return np.exp(2.0 * values[0]) * self._discrepancy, drift, np.exp(2.0 * values[3])
 
-    def _prior(self, values):
+    def _prior(self, values: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the log density of values (4,), and its gradient."""
         ratio = np.exp(values[1]) / self._scale
         white = np.exp(values[3]) / (3.0 * self.resolution + self._scale)
@@ -133,7 +137,14 @@ class Covariance:
         return float(density), gradient
 
     def point(self, values: np.ndarray) -> Point:
-        """Return the covariance for values (4,)."""
+        """
+        Return the covariance for values (4,).
+
+        Raises
+        ------
+        LinAlgError
+            If it is not positive definite by rounding.
+        """
         discrepancy, drift, white = self._parts(values)
         total = discrepancy + drift
         total[np.diag_indices_from(total)] += white
@@ -143,7 +154,7 @@ class Covariance:
         return Point(np.array(values), factor, constant)
 
     def white(self, size: float) -> Point:
-        """Return the covariance of white noise alone, in which a fit is one by least squares."""
+        """Return the covariance of white noise of a size alone: a fit is one by least squares."""
         count = len(self._discrepancy)
         values = np.array([self._low[0], self._low[1], self._middle, np.log(size)])
         return Point(values, size * np.eye(count), -np.inf)
@@ -154,7 +165,7 @@ class Covariance:
         self.points.append(found)
         return found
 
-    def largest_error(self, rng, count: int, level: float = 0.95) -> float:
+    def largest_error(self, rng: np.random.Generator, count: int, level: float = 0.95) -> float:
         """
         Return the root mean square error that the discrepancy stays below, at a probability.
 
@@ -165,6 +176,11 @@ class Covariance:
             Number of draws.
         level : float
             The probability.
+
+        Returns
+        -------
+        float
+            In the unit of the response.
         """
         values, vectors = linalg.eigh(self._discrepancy)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -183,6 +199,11 @@ class Covariance:
             Measured less simulated.
         values : ndarray, shape (4,), optional
             Where to begin; by default both where all is noise and where all is drift.
+
+        Returns
+        -------
+        ndarray, shape (4,)
+            As `Point.values`.
         """
         share = float(np.sqrt(np.mean(residual ** 2))) / self._scale
         starts = [self.start(0.1, share), self.start(share, 0.1)] if values is None else [
@@ -195,7 +216,8 @@ class Covariance:
                 for start in starts]
         return min(found, key=lambda one: one.fun).x
 
-    def _cost(self, values, residual):
+    def _cost(self, values: np.ndarray, residual: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return minus the log posterior density of values (4,), and its gradient."""
         discrepancy, drift, white = self._parts(values)
         total = discrepancy + drift
         total[np.diag_indices_from(total)] += white
@@ -210,7 +232,7 @@ class Covariance:
         inverse = np.tril(inverse, -1)
         prior, slope = self._prior(values)
 
-        def trace(part):
+        def trace(part: np.ndarray) -> float:
             inside = 2.0 * np.sum(inverse * part) + diagonal @ np.diag(part)
             return 0.5 * (inside - solved @ part @ solved)
 

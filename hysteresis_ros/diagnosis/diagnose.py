@@ -2,7 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Find the physical effects that a model is missing, or say why none can be named."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,19 +18,25 @@ from hysteresis_ros.diagnosis.verdict import Diagnosis
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.workers import one_blas_thread
 
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.workers import Progress
+
 __all__ = ['Diagnosis', 'diagnose']
 
 # Fewer rows cannot be divided into folds of which each says something.
 FEWEST_ROWS = 8
 
 
-def _silent(iterable, total):
-    return iterable
+def _silent(items: Iterable, total: int) -> Iterable:
+    return items
 
 
 @one_blas_thread()
-def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
-             settings: Settings = Settings(), progress=_silent) -> Diagnosis:
+def diagnose(model: MuscleModel, measurements: Sequence[Measurement],
+             effects: Sequence[str] | None = None, *, jobs: int = 1, seed: int = 0,
+             settings: Settings = Settings(), progress: Progress = _silent) -> Diagnosis:
     """
     Find what the model is missing.
 
@@ -45,7 +55,7 @@ def diagnose(model, measurements, effects=None, *, jobs: int = 1, seed: int = 0,
     settings : Settings
         Numbers that the selection rests on.
     progress : callable
-        ``progress(iterable, total)`` returns the iterable, for a progress bar.
+        ``progress(items, total)`` returns the items, for a progress bar.
 
     Returns
     -------

@@ -12,10 +12,23 @@ acts inside the operator and leaves its mark in the memory, or the muscle is at 
 its present load had acted all along. Their difference is the second part (`path_difference`).
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from hysteresis_ros.effects import MaterialEffect, Parameter, Statics
+from hysteresis_ros.effects import (
+    Effect, Inputs, MaterialEffect, Parameter, Statics, Surroundings)
 from hysteresis_ros.model.chain import Chain
+
+if TYPE_CHECKING:
+    from hysteresis_ros.bicep import BicepGeometry
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.settings import Settings
+    from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.operators import HysteresisOperator
 
 # The error that differs between the directions of the drive, against the common one.
 DIRECTIONAL = 0.5
@@ -29,12 +42,13 @@ class Offset(MaterialEffect):
     id = 'offset'
     parameters = (Parameter('size', 'm', 'what is added', 0.0, 1.0, 0.0, ()),)
 
-    def drift(self, drive, heat, inputs, surroundings):
+    def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,
+              surroundings: Surroundings) -> tuple[np.ndarray, np.ndarray]:
         """Return the offset."""
         return np.full(len(drive), self.size), np.ones(len(drive))
 
 
-def length_error(model) -> float:
+def length_error(model: MuscleModel) -> float:
     """
     Return the root mean square error of the length [m] that the bench has shown.
 
@@ -50,7 +64,7 @@ def length_error(model) -> float:
     return float(error) if error is not None and np.isfinite(error) else 0.0
 
 
-def sensitivity(problem, effects) -> np.ndarray:
+def sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """Return how the angle follows an error of the length [rad/m], shape (n,)."""
     step = 0.01 * problem.model.surroundings.span
     up, down = problem.simulate_many(
@@ -58,13 +72,14 @@ def sensitivity(problem, effects) -> np.ndarray:
     return (up - down) / (2.0 * step)
 
 
-def covariance(problem, effects, predicted, settings) -> np.ndarray:
+def covariance(problem: ArmProblem, effects: Sequence[Effect], predicted: np.ndarray,
+               settings: Settings) -> np.ndarray:
     """
     Return the covariance of the base model's own error of the angle.
 
     Parameters
     ----------
-    problem : Problem
+    problem : ArmProblem
         Rows and model.
     effects : sequence of Effect
         All effects of the model, which say where the arm goes.
@@ -88,7 +103,7 @@ def covariance(problem, effects, predicted, settings) -> np.ndarray:
     return near * (bench + np.outer(path, path))
 
 
-def _correlation(problem, predicted, length: float) -> np.ndarray:
+def _correlation(problem: ArmProblem, predicted: np.ndarray, length: float) -> np.ndarray:
     """
     Return the correlation (n, n) of errors at neighbouring drives and responses.
 
@@ -103,16 +118,26 @@ def _correlation(problem, predicted, length: float) -> np.ndarray:
     return 1.0 / np.sqrt(1.0 + np.maximum(gaps, 0.0))
 
 
-def path_difference(problem, effects) -> np.ndarray:
+def path_difference(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """
     Return what the angle would differ if the present load had acted all along, shape (n,).
 
     Parameters
     ----------
-    problem : Problem
-        Rows and model, of an arm.
+    problem : ArmProblem
+        Rows and model.
     effects : sequence of Effect
         Effects of the model.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Angles [rad].
+
+    Raises
+    ------
+    ParameterError
+        If the model has no geometry.
     """
     model = problem.model
     # What the sensor adds is no way of the arm; what depends on the phase would need it, and
@@ -124,7 +149,7 @@ def path_difference(problem, effects) -> np.ndarray:
     if not first.loaded:
         return np.zeros(len(problem.measured))
     theta = np.linspace(*model.require_geometry().angle_range, ANGLES)
-    load, demand = _statics(chain, model.geometry, theta, stage.output_range[0])
+    load, demand = _statics(chain, model.require_geometry(), theta, stage.output_range[0])
     columns = []
     for simulator in problem.simulators:
         angle = simulator.run(effects)
@@ -132,9 +157,10 @@ def path_difference(problem, effects) -> np.ndarray:
         loads = np.linspace(np.min(ends), np.max(ends) + 1e-9 * (1.0 + np.ptp(load)), LOADS)
         column = np.empty(len(angle))
         for trial in simulator.trials:
-            heat = chain.drive_squared(trial.drive, trial.inputs)
+            drive_squared = chain.drive_squared(trial.drive, trial.inputs)
             first.reset()
-            x = first.simulate(np.concatenate(([chain.to_drive_squared(model.cold_drive)], heat)))
+            cold = chain.to_drive_squared(model.cold_drive)
+            x = first.simulate(np.concatenate(([cold], drive_squared)))
             outputs = np.stack([_held(stage, model.sign * (x - one)) for one in loads])
             moving, still = (_balance(theta, load, demand, loads, given) for given in (
                 _along(stage, model.sign, x, angle[trial.rows], theta, load), outputs))
@@ -143,7 +169,8 @@ def path_difference(problem, effects) -> np.ndarray:
     return problem.pick(columns)
 
 
-def _statics(chain, geometry, theta, base):
+def _statics(chain: Chain, geometry: BicepGeometry, theta: np.ndarray, base: float
+             ) -> tuple[np.ndarray, np.ndarray]:
     """Return the load that H2 feels, and what it has to give above `base`, at each angle."""
     statics = Statics.of(geometry, theta)
     for effect in chain.mechanism:
@@ -154,20 +181,22 @@ def _statics(chain, geometry, theta, base):
     return chain.load_inside(force) + 0.0 * force, np.maximum.accumulate(demand)
 
 
-def _held(stage, inputs):
+def _held(stage: HysteresisOperator, inputs: np.ndarray) -> np.ndarray:
     """Return H2's output above its least (rows,) for inputs (rows + 1,), the cold one first."""
     stage.reset()
     stage.step(float(inputs[0]))
     return stage.simulate(inputs[1:]) - stage.output_range[0]
 
 
-def _along(stage, sign, x, angle, theta, load):
+def _along(stage: HysteresisOperator, sign: int, x: np.ndarray, angle: np.ndarray,
+           theta: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Return the same with the load of the arm's angle in each row, shape (1, rows)."""
     felt = np.interp(angle, theta, load)
     return _held(stage, sign * (x - np.concatenate((felt[:1], felt))))[None, :]
 
 
-def _balance(theta, load, demand, loads, outputs):
+def _balance(theta: np.ndarray, load: np.ndarray, demand: np.ndarray, loads: np.ndarray,
+             outputs: np.ndarray) -> np.ndarray:
     """Return the angle (rows,) at which outputs (loads, rows) give what the arm demands."""
     if len(outputs) > 1:
         place = np.clip((load - loads[0]) / (loads[1] - loads[0]), 0.0, len(loads) - 1.001)
@@ -182,5 +211,5 @@ def _balance(theta, load, demand, loads, outputs):
     return theta[above - 1] + share * (theta[above] - theta[above - 1])
 
 
-def _unit(values):
+def _unit(values: np.ndarray) -> np.ndarray:
     return (values - values.min()) / max(np.ptp(values), 1e-12)

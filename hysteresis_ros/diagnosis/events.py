@@ -2,19 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """Something that happened once and lasts: a step of the response at an unknown moment."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.discrepancy import sensitivity
 
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.selection import Selection
+
 # On each side of the moment at least this share of the rows is needed.
 MARGIN = 0.06
 
 
-def most_probable(problem, selection) -> tuple[float | None, float]:
+def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | None, float]:
     """
-    Return when something may have happened, and how probable that is beside the sets of effects.
+    Return when something may have happened, and how probable that is against the sets of effects.
 
     A step of unknown size in the response, or in the muscle's length, is one more column of the
     response; its size has a Gaussian prior of the size of the residual, and each moment the same
@@ -22,7 +29,7 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
 
     Parameters
     ----------
-    problem : Problem
+    problem : ArmProblem
     selection : Selection
 
     Returns
@@ -49,12 +56,12 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
     for point in selection.covariance.points:
         whitened = point.whiten(residual)
         base = point.constant - 0.5 * float(whitened @ whitened)
-        for shape, enough in zip(shapes, large):
+        for shape, explains in zip(shapes, large):
             columns = point.whiten(steps * shape[:, None])
             precision = np.sum(columns ** 2, axis=0) + 1.0 / prior
             slope = columns.T @ whitened
             evidence = base + 0.5 * slope ** 2 / precision - 0.5 * np.log(precision * prior)
-            evidence[~enough] = -np.inf
+            evidence[~explains] = -np.inf
             index = int(np.argmax(evidence))
             if evidence[index] > best:
                 best, moment = float(evidence[index]), rows[index]
@@ -63,6 +70,6 @@ def most_probable(problem, selection) -> tuple[float | None, float]:
     return float(problem.clock[moment]), total
 
 
-def _explained(residual, columns) -> np.ndarray:
+def _explained(residual: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Return by how much each column (n, m) lowers the mean square of a residual, shape (m,)."""
     return (columns.T @ residual) ** 2 / np.sum(columns ** 2, axis=0) / len(residual)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 import dataclasses
 import hashlib
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from hysteresis_ros.diagnosis.observable import may_differ, present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
-from hysteresis_ros.effects import effect_class
+from hysteresis_ros.effects import Effect, effect_class
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.model import MuscleModel
@@ -26,8 +27,15 @@ from hysteresis_ros.workers import one_blas_thread
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.bench_problem import BenchProblem
+    from hysteresis_ros.measurements import Measurement
+
 # Of the last fit, whose values are kept.
 EVALUATIONS, TOLERANCE = 30, 1e-4
+
+# Effects with intervals, and the names of parameters outside their physical range.
+Fitted = tuple[list[Effect], list[str]]
 
 
 @dataclasses.dataclass(repr=False)
@@ -53,11 +61,11 @@ class Extension(Result):
     """
 
     model: MuscleModel
-    added: list
-    train: dict
-    test: dict
-    steps: list
-    implausible: list
+    added: list[Effect]
+    train: dict[str, float]
+    test: dict[str, float]
+    steps: list[tuple[str, float]]
+    implausible: list[str]
     quantity: str = ''
 
     def to_dict(self) -> dict:
@@ -96,8 +104,8 @@ class Extension(Result):
         return waterfall(self.steps, None, self.quantity)
 
 
-def rmse(model, measurements) -> float:
-    """Root mean square error of a model over recordings, in the unit of the response."""
+def rmse(model: MuscleModel, measurements: Iterable[Measurement]) -> float:
+    """Return the root mean square error of a model over recordings, in the response's unit."""
     squares, rows = 0.0, 0
     for measurement in measurements:
         error = model.predict(measurement) - measurement.column(measurement.response)
@@ -107,7 +115,8 @@ def rmse(model, measurements) -> float:
 
 
 @one_blas_thread()
-def extend(model, names, train, test=()) -> Extension:
+def extend(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],
+           test: Sequence[Measurement] = ()) -> Extension:
     """
     Add effects and fit them together.
 
@@ -149,7 +158,7 @@ def extend(model, names, train, test=()) -> Extension:
     # Where weights are refitted, the fair base is one that was refitted to the same rows.
     before = problem.completed(model.effects) if problem.refits else model
 
-    def both(recordings):
+    def both(recordings: Sequence[Measurement]) -> dict[str, float]:
         if not recordings:
             return {}
         return {'rmse_before': rmse(before, recordings), 'rmse_after': rmse(extended, recordings)}
@@ -158,7 +167,8 @@ def extend(model, names, train, test=()) -> Extension:
 
 
 @one_blas_thread()
-def extended_model(model, names, train) -> tuple:
+def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]
+                   ) -> tuple[MuscleModel, list[Effect]]:
     """
     Return the extended model and the effects added; `extend` also says what each of them gained.
 
@@ -170,7 +180,8 @@ def extended_model(model, names, train) -> tuple:
     return _stamped(completed, added, train, problem.kind), added
 
 
-def _fitted(model, names, train):
+def _fitted(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]
+            ) -> tuple[ArmProblem | BenchProblem, list[type[Effect]], list[Fitted]]:
     """Return the problem without the effects named, their classes, and the fit after each."""
     classes = _checked(problem_for(model, train), names)
     replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
@@ -180,10 +191,12 @@ def _fitted(model, names, train):
         if problem.kind not in kind.kinds:
             raise ParameterError(f'effect {kind.id} cannot be fitted to a {problem.kind} '
                                  'measurement; give an arm run')
-    return problem, classes, (_on_bench if problem.refits else _on_arm)(problem, model, classes)
+    return problem, classes, (_on_bench(problem, model, classes) if problem.refits
+                              else _on_arm(problem, model, classes))
 
 
-def _checked(problem, names):
+def _checked(problem: ArmProblem | BenchProblem, names: Iterable[str]) -> list[type[Effect]]:
+    """Return the classes of the effects named, which are neither there nor named twice."""
     names = list(names)
     fixed = {e.id for e in problem.model.effects if not may_differ(problem, e)}
     for name in names:
@@ -196,9 +209,12 @@ def _checked(problem, names):
     return [effect_class(name) for name in names]
 
 
-def _on_bench(problem, model, classes) -> list:
+def _on_bench(problem: BenchProblem, model: MuscleModel, classes: Sequence[type[Effect]]
+              ) -> list[Fitted]:
     """Fit effects one after the other, each with those before; the weights are refitted."""
-    fitter, known, found = BenchFitter(problem), [], []
+    fitter = BenchFitter(problem)
+    known: list[Effect] = []
+    found: list[Fitted] = []
     for number, kind in enumerate(classes, 1):
         known = [effect for effect in known if effect.id not in kind.replaces]
         effect = present(model, kind)
@@ -213,10 +229,12 @@ def _on_bench(problem, model, classes) -> list:
     return found
 
 
-def _on_arm(problem, model, classes) -> list:
+def _on_arm(problem: ArmProblem, model: MuscleModel, classes: Sequence[type[Effect]]
+            ) -> list[Fitted]:
     """Fit effects one after the other, each with those before; the weights stay."""
     selection = Selection(problem, Settings(), np.random.default_rng(0), lambda items, total: items)
-    fit, found = selection.base, []
+    fit = selection.base
+    found: list[Fitted] = []
     for kind in classes:
         fit = selection.add(fit, present(model, kind))
         best = selection.fitter.least_squares(fit)
@@ -224,7 +242,8 @@ def _on_arm(problem, model, classes) -> list:
     return found
 
 
-def _stamped(model, added, train, kind):
+def _stamped(model: MuscleModel, added: Iterable[Effect], train: Iterable[Measurement],
+             kind: str) -> MuscleModel:
     """Note in the provenance what was added from which recordings."""
     provenance = dict(model.provenance)
     history = list(provenance.get('extended', []))

@@ -2,14 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which problem suits the kind of the measurements."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 from hysteresis_ros.diagnosis.arm_problem import ArmProblem
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
-from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import MeasurementError
 
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model import MuscleModel
 
-def problem_for(model, measurements, effects=None, jobs: int = 1) -> Problem:
+
+def problem_for(model: MuscleModel, measurements: Iterable[Measurement],
+                effects: Iterable[str] | None = None, jobs: int = 1) -> ArmProblem | BenchProblem:
     """
     Return the problem that suits the kind of the measurements.
 
@@ -21,6 +30,10 @@ def problem_for(model, measurements, effects=None, jobs: int = 1) -> Problem:
         Effects to try; by default the whole catalogue.
     jobs : int
         Threads for the simulations; -1 for all cores.
+
+    Returns
+    -------
+    ArmProblem or BenchProblem
 
     Raises
     ------
@@ -41,7 +54,8 @@ def problem_for(model, measurements, effects=None, jobs: int = 1) -> Problem:
     if len(kinds) > 1:
         raise MeasurementError(f'the measurements are of several kinds ({", ".join(kinds)}); give '
                                'either bench tables or arm runs')
-    kind = BenchProblem if measurements[0].kind == 'bench' else ArmProblem
+    kind: type[ArmProblem | BenchProblem] = (
+        BenchProblem if measurements[0].kind == 'bench' else ArmProblem)
     problem = kind(model, measurements)
     problem.jobs = jobs
     if effects is not None:

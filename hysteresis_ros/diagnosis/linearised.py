@@ -8,14 +8,22 @@ of an effect, and of two whose responses add up, is a small linear algebra probl
 covariance at hand (MacKay, Information Theory, ch. 28). It says which sets are worth a full fit.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 import dataclasses
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
+    from hysteresis_ros.diagnosis.covariance import Point
 
 # Starts of an effect from which pairs are made.
 PAIRED_STARTS = 3
@@ -37,7 +45,7 @@ class Start:
         Derivatives in units of the prior's standard deviation.
     """
 
-    effect: object
+    effect: Effect
     change: np.ndarray
     columns: np.ndarray
 
@@ -47,9 +55,9 @@ class Start:
         return self.effect.id
 
 
-def starts_beside(fitter, fit, names) -> list[Start]:
+def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[Start]:
     """
-    Linearise effects at all their starts, with the effects of a fit in place.
+    Linearise effects at all their starts, with the effects of a fit fixed.
 
     Parameters
     ----------
@@ -76,25 +84,26 @@ def starts_beside(fitter, fit, names) -> list[Start]:
     walks = [_Moves(start, fit.effects, problem.kind) for start in starts]
     responses = iter(fitter.simulate([effects for walk in walks for effects in walk.sets]))
     for walk in walks:
-        own = np.stack([next(responses) for _ in walk.sets])
-        if not np.all(np.isfinite(own)):
+        given = np.stack([next(responses) for _ in walk.sets])
+        if not np.all(np.isfinite(given)):
             continue
-        jacobian = (own[1:] - own[0]).T / np.array(walk.steps)
+        jacobian = (given[1:] - given[0]).T / np.array(walk.steps)
         mean, spread = walk.parameters.prior()
-        found.append(Start(walk.start, own[0] - fit.predicted + jacobian @ (mean - walk.vector),
-                           jacobian * spread))
+        found.append(Start(walk.start, given[0] - fit.predicted + jacobian @ (
+            mean - walk.vector), jacobian * spread))
     return found
 
 
 class _Moves:
     """The sets to simulate for the derivatives of one effect at a start."""
 
-    def __init__(self, start, others, kind):
+    def __init__(self, start: Effect, others: Sequence[Effect], kind: str) -> None:
         others = [effect for effect in others if effect.id not in start.replaces]
         self.start = start
         self.parameters = ParameterVector([start], kind)
         self.vector = self.parameters.vector()
-        self.sets, self.steps = [[*others, start]], []
+        self.sets: list[list[Effect]] = [[*others, start]]
+        self.steps: list[float] = []
         for index, value in enumerate(self.vector):
             step = 0.02 if value + 0.02 < self.parameters.upper[index] else -0.02
             moved = self.vector.copy()
@@ -105,21 +114,22 @@ class _Moves:
 
 class Linearised:
     """
-    Evidences of single effects and pairs beside a fit.
+    Evidences of single effects and pairs, in addition to the effects of a fit.
 
     Parameters
     ----------
     points : list of Point
         Covariances to try.
     residual : ndarray, shape (n,)
-        What the fit leaves.
+        Of the fit.
     starts : list of Start
     nuisance : ndarray, shape (n, m)
         Derivatives by the parameters of the fit, in units of their prior's spread; they are
         estimated anew with whatever is added.
     """
 
-    def __init__(self, points, residual, starts, nuisance=None):
+    def __init__(self, points: Sequence[Point], residual: np.ndarray, starts: Sequence[Start],
+                 nuisance: np.ndarray | None = None) -> None:
         self.starts = starts
         count = len(residual)
         nuisance = np.zeros((count, 0)) if nuisance is None else nuisance
@@ -135,7 +145,7 @@ class Linearised:
             whitened = point.whiten(self._columns)
             self._grams.append(whitened.T @ whitened)
 
-    def _places(self, chosen):
+    def _places(self, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the columns' places of `chosen` (m, s) starts: derivatives (m, k), changes."""
         chosen = np.asarray(chosen)
         first = 1 + len(self.starts)
@@ -145,13 +155,13 @@ class Linearised:
         changes = np.concatenate([np.zeros((len(chosen), 1), dtype=int), 1 + chosen], axis=1)
         return np.concatenate([fixed, derivatives], axis=1), changes
 
-    def evidences(self, chosen) -> np.ndarray:
+    def evidences(self, chosen: np.ndarray) -> np.ndarray:
         """
         Return the log evidences of sets of starts, the largest over the covariances.
 
         Parameters
         ----------
-        chosen : sequence of sequence of int, shape (m, s)
+        chosen : ndarray of int, shape (m, s)
             Indices of the starts of each set, all sets of one size.
 
         Returns
@@ -178,37 +188,51 @@ class Linearised:
             best = np.maximum(best, evidence)
         return best
 
-    def singles(self) -> dict[tuple, tuple[float, list]]:
-        """Return for each effect the best evidence and the start that reaches it."""
+    def singles(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
+        """
+        Score single effects.
+
+        Returns
+        -------
+        dict of tuple of str to (float, list of Effect)
+            By the name of the effect its largest log evidence, and the start that reaches it.
+        """
         values = self.evidences(np.arange(len(self.starts))[:, None])
-        found: dict[tuple, tuple[float, list]] = {}
+        found: dict[tuple[str, ...], tuple[float, list[Effect]]] = {}
         for start, value in zip(self.starts, values):
             if (start.id,) not in found or value > found[start.id,][0]:
                 found[start.id,] = (float(value), [start.effect])
         return found
 
-    def pairs(self) -> dict[tuple, tuple[float, list]]:
-        """Return the same for pairs of effects, from the best few starts of each."""
+    def pairs(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
+        """
+        Score pairs of effects, from the best few starts of each.
+
+        Returns
+        -------
+        dict of tuple of str to (float, list of Effect)
+            By their sorted names the largest log evidence, and the starts that reach it.
+        """
         alone = self.evidences(np.arange(len(self.starts))[:, None])
-        kept: dict[str, list] = {}
+        best_starts: dict[str, list[int]] = {}
         for index in np.argsort(-alone, kind='stable'):
-            own = kept.setdefault(self.starts[index].id, [])
+            own = best_starts.setdefault(self.starts[index].id, [])
             if len(own) < PAIRED_STARTS:
                 own.append(int(index))
-        chosen = []
-        for one, other in itertools.combinations(kept, 2):
-            first, second = (self.starts[kept[name][0]].effect for name in (one, other))
+        chosen: list[tuple[int, int]] = []
+        for one, other in itertools.combinations(best_starts, 2):
+            first, second = (self.starts[best_starts[name][0]].effect for name in (one, other))
             if other not in first.replaces and one not in second.replaces:
-                chosen += itertools.product(kept[one], kept[other])
-        found: dict[tuple, tuple[float, list]] = {}
-        for (one, other), value in zip(chosen, self.evidences(np.array(chosen).reshape(-1, 2))):
-            effects = [self.starts[index].effect for index in (one, other)]
+                chosen += itertools.product(best_starts[one], best_starts[other])
+        found: dict[tuple[str, ...], tuple[float, list[Effect]]] = {}
+        for indices, value in zip(chosen, self.evidences(np.array(chosen).reshape(-1, 2))):
+            effects = [self.starts[index].effect for index in indices]
             names = tuple(sorted(effect.id for effect in effects))
             if names not in found or value > found[names][0]:
                 found[names] = (float(value), effects)
         return found
 
-    def p_values(self, point, rng, count: int) -> dict[str, float]:
+    def p_values(self, point: Point, rng: np.random.Generator, count: int) -> dict[str, float]:
         """
         Return family-wise p values of single effects.
 
@@ -231,7 +255,7 @@ class Linearised:
         draws = point.factor @ rng.standard_normal((len(point.factor), count))
         alone = np.arange(len(self.starts))[:, None]
         derivatives, _ = self._places(alone)
-        chance = np.full((len(self.starts), count), -np.inf)
+        by_chance = np.full((len(self.starts), count), -np.inf)
         base = np.full(count, -np.inf)
         for other, gram in zip(self._points, self._grams):
             drawn = other.whiten(draws)
@@ -249,9 +273,9 @@ class Linearised:
                 solved = np.linalg.solve(factor, slope)
                 evidence = (evidence + 0.5 * np.sum(solved ** 2, axis=1) - np.sum(
                     np.log(np.diagonal(factor, axis1=1, axis2=2)), axis=1)[:, None])
-            chance = np.maximum(chance, evidence)
+            by_chance = np.maximum(by_chance, evidence)
             base = np.maximum(base, other.constant - 0.5 * np.sum(drawn ** 2, axis=0))
-        best = np.max(chance - base, axis=0)
+        best = np.max(by_chance - base, axis=0)
         present_base = max(other.constant - 0.5 * gram[0, 0]
                            for other, gram in zip(self._points, self._grams))
         return {names[0]: float((1 + np.sum(best >= value - present_base)) / (1 + count))

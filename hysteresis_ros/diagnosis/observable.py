@@ -2,15 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which effects of the catalogue a recording can show at all."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.problem import Problem
+    from hysteresis_ros.model import MuscleModel
 
 # A recorded temperature [degC] that changes by less is a constant with noise on it.
 SMALLEST_CHANGE = 0.5
 
 
-def observable(problem) -> tuple[list[str], dict[str, str]]:
+def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
     """
     Divide the catalogue into effects to try and effects that this data cannot show.
 
@@ -26,7 +35,8 @@ def observable(problem) -> tuple[list[str], dict[str, str]]:
     """
     surroundings = problem.model.surroundings
     taken = {effect.id for effect in problem.model.effects if not may_differ(problem, effect)}
-    names, unobservable = [], {}
+    names: list[str] = []
+    unobservable: dict[str, str] = {}
     for name, effect in catalogue().items():
         if name in taken or problem.kind not in effect.kinds:
             continue
@@ -46,20 +56,20 @@ def observable(problem) -> tuple[list[str], dict[str, str]]:
     return names, unobservable
 
 
-def present(model, kind):
+def present(model: MuscleModel, kind: type[Effect]) -> Effect:
     """Return the model's own effect of a kind, or a neutral one."""
     own = [effect for effect in model.effects if effect.id == kind.id]
     return own[0] if own else kind(model.surroundings)
 
 
-def may_differ(problem, effect) -> bool:
+def may_differ(problem: Problem, effect: Effect) -> bool:
     """Whether an effect of the model may be another one here than on the bench that showed it."""
     return problem.kind == 'arm' and 'bench' in effect.kinds
 
 
-def unaffected(fixed, effects) -> list:
+def unaffected(fixed: Sequence[Effect], effects: Sequence[Effect]) -> list[Effect]:
     """
-    Return the effects of a model that stay as they are beside fitted ones.
+    Return the effects of a model that are not refitted with others.
 
     An effect of the wire that the bench has shown may be fitted anew to the wires of an arm.
     """

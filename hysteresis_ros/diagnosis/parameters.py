@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Free parameters of effects as one vector that an optimiser can move."""
 
+from collections.abc import Sequence
 import itertools
 import math
 
 import numpy as np
+
+from hysteresis_ros.effects import Effect, Parameter
 
 
 class ParameterVector:
@@ -23,7 +26,7 @@ class ParameterVector:
         'arm' or 'bench'.
     """
 
-    def __init__(self, effects, kind: str):
+    def __init__(self, effects: Sequence[Effect], kind: str) -> None:
         self.effects = list(effects)
         self.entries = [(index, parameter) for index, effect in enumerate(self.effects)
                         for parameter in effect.parameters
@@ -56,16 +59,16 @@ class ParameterVector:
             spread.append(0.5 * (high - low) / 1.5)
         return np.array(mean), np.array(spread)
 
-    def with_vector(self, vector) -> list:
+    def with_vector(self, vector: np.ndarray) -> list[Effect]:
         """Return the effects with the values of a vector of shape (k,)."""
-        values = [{} for _ in self.effects]
+        values: list[dict[str, float]] = [{} for _ in self.effects]
         for (index, parameter), value in zip(self.entries, np.clip(
                 vector, self.lower, self.upper)):
             values[index][parameter.name] = _from_unit(parameter, float(value))
         return [effect.with_values(**changed)
                 for effect, changed in zip(self.effects, values)]
 
-    def with_intervals(self, vector, half_widths) -> list:
+    def with_intervals(self, vector: np.ndarray, half_widths: np.ndarray) -> list[Effect]:
         """Return the effects at `vector` (k,) with the intervals of `half_widths` (k,)."""
         effects = self.with_vector(vector)
         ends = np.clip(np.stack([vector - half_widths, vector + half_widths]),
@@ -76,26 +79,41 @@ class ParameterVector:
         return effects
 
 
-def _unit(parameter) -> float:
+def _unit(parameter: Parameter) -> float:
     return max(parameter.high if parameter.both_signs else parameter.high - parameter.low, 1e-12)
 
 
-def _to_unit(parameter, value: float) -> float:
+def _to_unit(parameter: Parameter, value: float) -> float:
     if parameter.log:
         return math.log(max(value, parameter.bounds[0]))
     return value / _unit(parameter)
 
 
-def _from_unit(parameter, value: float) -> float:
+def _from_unit(parameter: Parameter, value: float) -> float:
     return math.exp(value) if parameter.log else value * _unit(parameter)
 
 
-def starts_of(effect, kind: str, measured=None, most: int = 14) -> list:
+def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
+              most: int = 14) -> list[Effect]:
     """
     Return copies of `effect` at the values from which a fit may start.
 
     All combinations of the starts of its parameters, thinned evenly to at most `most`, and what
     the response, where it is given, suggests.
+
+    Parameters
+    ----------
+    effect : Effect
+    kind : str
+        'arm' or 'bench'.
+    measured : ndarray, shape (n,), optional
+        The response.
+    most : int
+        Combinations, without those that the response suggests.
+
+    Returns
+    -------
+    list of Effect
     """
     fitted = [parameter for parameter in effect.parameters if kind in parameter.kinds]
     combinations = list(itertools.product(
@@ -110,7 +128,7 @@ def starts_of(effect, kind: str, measured=None, most: int = 14) -> list:
     return starts + [starts[0].with_values(**guess) for guess in guesses]
 
 
-def usual(effects, kind: str) -> list:
+def usual(effects: Sequence[Effect], kind: str) -> list[Effect]:
     """Return copies of effects at usual values; what is chosen, not fitted, stays."""
     found = []
     for effect in effects:

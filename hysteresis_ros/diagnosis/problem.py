@@ -7,7 +7,10 @@ How a model answers to them is told by the kind of the measurements: see `arm_pr
 `bench_problem`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +18,9 @@ from hysteresis_ros.effects import Effect
 from hysteresis_ros.measurements.metrics import resolution_noise
 from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.model.simulation import Simulator
+
+if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
 
 # A long recording is judged on about this many rows; between them nothing new is learned. Weights
 # that are refitted again and again ask for fewer.
@@ -28,10 +34,20 @@ class Problem:
     """
     Measured rows of one or more recordings of one kind.
 
+    Parameters
+    ----------
+    model : MuscleModel
+    measurements : sequence of Measurement
+        All of one kind and one response.
+
     Attributes
     ----------
     measured : ndarray, shape (n,)
-        The response in the rows that are judged.
+        The response in the rows that are judged: an angle [rad], a length [m] or a strain.
+    noise : float
+        Standard deviation that the sensor's resolution causes, in the unit of the response.
+    clock : ndarray, shape (n,)
+        Time of each row since the first recording began [s].
     trial, fold, block : ndarray of int, shape (n,)
         Which trial a row is of, which rows are held out together, and which count as one in the
         significance.
@@ -40,11 +56,11 @@ class Problem:
     """
 
     # Effects to try; None for the whole catalogue.
-    catalogue: tuple | None = None
+    catalogue: tuple[str, ...] | None = None
     # Threads for the simulations; -1 for all cores.
     jobs: int = 1
 
-    def __init__(self, model, measurements):
+    def __init__(self, model: MuscleModel, measurements: Sequence[Measurement]) -> None:
         self.model = model
         self.measurements = measurements
         self.kind = measurements[0].kind
@@ -60,14 +76,21 @@ class Problem:
         self.signals = self._signals()
 
     def completed(self, effects: Sequence[Effect]) -> MuscleModel:
-        """Return the model with effects; where weights are refitted, with new ones."""
+        """
+        Return the model with effects; where weights are refitted, with new ones.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        """
         raise NotImplementedError
 
-    def pick(self, columns) -> np.ndarray:
+    def pick(self, columns: Sequence[np.ndarray]) -> np.ndarray:
         """Return the judged rows of a column given for every recording, shape (n,)."""
         return np.concatenate([column[rows] for column, rows in zip(columns, self.chosen)])
 
-    def _divide(self):
+    def _divide(self) -> None:
         """Hold out whole trials; with a single one, blocks in time."""
         count, columns = 0, []
         for measurement in self.measurements:
@@ -96,10 +119,10 @@ class Problem:
         """Identifiers of the folds."""
         return np.unique(self.fold)
 
-    def _signals(self) -> dict:
-        columns: dict[str, list] = {}
+    def _signals(self) -> dict[str, np.ndarray]:
+        columns: dict[str, list[np.ndarray]] = {}
         for simulator in self.simulators:
-            parts: dict[str, list] = {}
+            parts: dict[str, list[np.ndarray]] = {}
             for trial in simulator.trials:
                 drive, time = trial.drive, np.asarray(trial.inputs.time)
                 change = np.diff(drive, prepend=self.model.cold_drive)

@@ -7,7 +7,15 @@ What it can predict on held-out rows is no noise, whatever its cause. It serves 
 only and is never offered as a model.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.problem import Problem
 
 FEATURES = 60
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0, 10.0)
@@ -15,12 +23,27 @@ RIDGES = (1e-3, 1e-2, 1e-1, 1.0, 10.0)
 LEAST_SHARE = 0.1
 
 
-def predictable(signals: dict, residual: np.ndarray, fold: np.ndarray, seed: int = 0) -> float:
+def predictable(signals: Mapping[str, np.ndarray], residual: np.ndarray, fold: np.ndarray,
+                seed: int = 0) -> float:
     """
     Share of the residual's mean square that a regression predicts on held-out rows.
 
     Random cosine features of all signals with ridge regression; the best of some ridges is taken,
     which favours the regression a little.
+
+    Parameters
+    ----------
+    signals : dict of str to ndarray, shape (n,)
+    residual : ndarray, shape (n,)
+    fold : ndarray of int, shape (n,)
+        Which rows are held out together.
+    seed : int
+        Of the features.
+
+    Returns
+    -------
+    float
+        From 0 to 1.
     """
     if not signals:
         return 0.0
@@ -45,7 +68,7 @@ def predictable(signals: dict, residual: np.ndarray, fold: np.ndarray, seed: int
     return float(max(0.0, 1.0 - np.min(errors) / max(total, 1e-300)))
 
 
-def shares(problem, residual: np.ndarray) -> dict[str, float]:
+def shares(problem: Problem, residual: np.ndarray) -> dict[str, float]:
     """
     Return the share of a residual's mean square that each signal predicts, and 'all' together.
 
@@ -53,15 +76,19 @@ def shares(problem, residual: np.ndarray) -> dict[str, float]:
     ----------
     problem : Problem
     residual : ndarray, shape (n,)
+
+    Returns
+    -------
+    dict of str to float
     """
     found = {name: predictable({name: values}, residual, problem.fold)
              for name, values in problem.signals.items()}
     return {**found, 'all': predictable(problem.signals, residual, problem.fold)}
 
 
-def unexplained_signal(problem, residual: np.ndarray) -> str:
+def unexplained_signal(problem: Problem, residual: np.ndarray) -> str:
     """Return the signal that alone predicts most of a residual (n,), '' if none predicts any."""
     found = shares(problem, residual)
     del found['all']
-    name = max(found, key=found.get, default='')
+    name = max(found, key=found.__getitem__, default='')
     return name if found.get(name, 0.0) > LEAST_SHARE else ''

@@ -4,27 +4,37 @@
 Select the set of effects that explains runs of an arm, by its posterior probability.
 
 All effects and all pairs are scored by linearisation at every start; the best are fitted in full.
-Sets are then grown from the most probable ones, again by linearisation beside each and full fits of
-the best, until none of the most probable sets has not been grown from. What is compared in the end
-are full fits.
+Sets are then grown from the most probable ones, again by linearisation at each and full fits of the
+best, until none of the most probable sets has not been grown from. What is compared in the end are
+full fits.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
-from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.covariance import Covariance, Point
 from hysteresis_ros.diagnosis.discrepancy import covariance
-from hysteresis_ros.diagnosis.linearised import Linearised, Start, starts_beside
+from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_starts
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.effects import Effect
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.settings import Settings
+    from hysteresis_ros.workers import Progress
 
 # Drift and noise of the first covariances, as shares of the discrepancy.
 FIRST_POINTS = ((0.1, 0.05), (0.4, 0.3), (1.5, 0.3), (6.0, 0.3))
 # Sets that are begun, for one that is fitted to the end, and steps of what is begun.
 BEGUN, FIRST_STEPS = 3, 3
-# Of several effects each has to take this share off the first error, to be seen beside it.
+# Of several effects each has to take this share off the first error, to be seen with the others.
 LEAST_SHARE = 0.015
 SIGNIFICANCE = 0.05
 
@@ -39,7 +49,7 @@ class Selection:
     settings : Settings
     rng : numpy.random.Generator
     progress : callable
-        ``progress(iterable, total)``, for a progress bar.
+        ``progress(items, total)``, for a progress bar.
 
     Attributes
     ----------
@@ -49,11 +59,15 @@ class Selection:
         The best full fit of each set.
     unobservable : dict of str to str
         Effects that this data cannot show, with the reason.
+    rmse_95 : float
+        Root mean square that the base model's own error stays below at 95 %, in the unit of the
+        response.
     temper : float
         What log evidences are divided by; see `Settings.coarsening`.
     """
 
-    def __init__(self, problem, settings, rng, progress):
+    def __init__(self, problem: ArmProblem, settings: Settings, rng: np.random.Generator,
+                 progress: Progress) -> None:
         self.problem, self.settings = problem, settings
         self.rng, self.progress = rng, progress
         self._odds = math.log(settings.prior / (1.0 - settings.prior))
@@ -70,18 +84,18 @@ class Selection:
         self.covariance.add(self.covariance.fit(problem.measured - predicted))
         self.base = self.fitter.judge(
             Fit([], np.zeros(0), predicted, np.zeros((len(predicted), 0))))
-        self.fits: dict[frozenset, Fit] = {frozenset(): self.base}
-        self._grown: set[frozenset] = set()
-        self._refined: set[frozenset] = set()
-        self._least_errors: dict[frozenset, float] = {}
+        self.fits: dict[frozenset[str], Fit] = {frozenset(): self.base}
+        self._grown: set[frozenset[str]] = set()
+        self._refined: set[frozenset[str]] = set()
+        self._least_errors: dict[frozenset[str], float] = {}
         # Both with the response that they belong to.
-        self._linearised: dict[frozenset, tuple[np.ndarray, Linearised]] = {}
-        self._errors: dict[frozenset, tuple[np.ndarray, float]] = {}
-        self.limit = self.covariance.largest_error(rng, settings.draws)
-        self.alone: Linearised | None = None
+        self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
+        self._errors: dict[frozenset[str], tuple[np.ndarray, float]] = {}
+        self.rmse_95 = self.covariance.largest_error(rng, settings.draws)
+        self.alone: Linearised
         self.p_values: dict[str, float] = {}
 
-    def _discrepancy(self, fit) -> np.ndarray:
+    def _discrepancy(self, fit: Fit) -> np.ndarray:
         """Return the discrepancy (n, n) of the base model where the arm goes with a fit."""
         effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
         return covariance(self.problem, effects, fit.predicted, self.settings)
@@ -93,7 +107,7 @@ class Selection:
             stage()
 
     def _score(self) -> None:
-        self.alone = self._beside(frozenset())
+        self.alone = self._linearised_with(frozenset())
 
     def _fit_alone(self) -> None:
         """Fit every effect by itself, from the start that scored best."""
@@ -103,7 +117,7 @@ class Selection:
         self._refine(1)
 
     def _grow_sets(self) -> None:
-        """Grow sets, size by size, while the best one leaves too much."""
+        """Grow sets, size by size, while the residual of the best one is too large."""
         for size in range(1, self.settings.most_effects):
             if not self._worth_growing():
                 break
@@ -124,39 +138,39 @@ class Selection:
                 fitted.append(Start(fit.effects[0], change, fit.jacobian * spread))
         family = Linearised(self.covariance.points, self.problem.measured - self.base.predicted,
                             [*self.alone.starts, *fitted])
-        return family.p_values(self.base.point, self.rng, self.settings.draws)
+        return family.p_values(self.base.require_point(), self.rng, self.settings.draws)
 
     def _worth_growing(self) -> bool:
-        """Whether larger sets are due: the best leaves too much, or what it should not leave."""
+        """Whether the best set's residual is too large, or one more effect explains some of it."""
         valid = self.valid()
         if not valid:
             return True
         best = next((names for names in valid if self.sufficient(names)), valid[0])
-        form = self.settings.form * self.structure(frozenset()) if best else 0.0
-        if self.structure(best) > math.hypot(self.limit, form):
+        form = self.settings.form * self.noise_free_rmse(frozenset()) if best else 0.0
+        if self.noise_free_rmse(best) > math.hypot(self.rmse_95, form):
             return True
         # What a further effect explains has to exceed the base model's own error.
         return bool(best) and self.error(best) > self.covariance.size and self._promising(best)
 
-    def _promising(self, names) -> bool:
+    def _promising(self, names: frozenset[str]) -> bool:
         """Whether one more effect makes a set more probable, by linearisation."""
-        beside = self._beside(names)
-        alone, = beside.evidences(np.zeros((1, 0), dtype=int))
-        gain = max((value for value, _ in beside.singles().values()), default=-np.inf) - alone
+        further = self._linearised_with(names)
+        alone, = further.evidences(np.zeros((1, 0), dtype=int))
+        gain = max((value for value, _ in further.singles().values()), default=-np.inf) - alone
         return gain / self.temper > -self._odds
 
-    def grow(self, names) -> None:
+    def grow(self, names: frozenset[str]) -> None:
         """Fit the best sets of one more effect than those named."""
         if names in self._grown:
             return
         self._grown.add(names)
         fit = self.fits[names]
-        found = self._beside(names).singles()
+        found = self._linearised_with(names).singles()
         self._fit_best({key: (value, [
             *(one for one in fit.effects if one.id not in effects[0].replaces), *effects])
             for key, (value, effects) in found.items()})
 
-    def add(self, fit, effect) -> Fit:
+    def add(self, fit: Fit, effect: Effect) -> Fit:
         """
         Return the best fit of one more effect together with those of a fit.
 
@@ -165,17 +179,26 @@ class Selection:
         fit : Fit
         effect : Effect
             Its values are one of the starts.
+
+        Returns
+        -------
+        Fit
+
+        Raises
+        ------
+        ValueError
+            If no start can be simulated.
         """
-        kept = [one for one in fit.effects if one.id not in effect.replaces]
+        others = [one for one in fit.effects if one.id not in effect.replaces]
         starts = [*starts_of(effect, self.problem.kind, self.problem.measured), effect]
-        found = self.fitter.fit([[*kept, start] for start in starts], self._metric(),
+        found = self.fitter.fit([[*others, start] for start in starts], self._metric(),
                                 FIRST_STEPS)
         found.sort(key=lambda one: -one.log_evidence)
         found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
         return self.fitter.refined(max(found, key=lambda one: one.log_evidence))
 
-    def _beside(self, names) -> Linearised:
-        """Linearise all other effects beside a set."""
+    def _linearised_with(self, names: frozenset[str]) -> Linearised:
+        """Return all other effects, linearised at the values that those of a set have."""
         fit = self.fits[names]
         known = self._linearised.get(names)
         if known is None or known[0] is not fit.predicted:
@@ -183,12 +206,12 @@ class Selection:
             others = [name for name in self.names if name not in taken]
             _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
             self._linearised[names] = known = (fit.predicted, Linearised(
-                [fit.point] if fit.covariance else self.covariance.points,
+                [fit.require_point()] if fit.covariance else self.covariance.points,
                 self.problem.measured - fit.predicted,
-                starts_beside(self.fitter, fit, others), fit.jacobian * spread))
+                linearised_starts(self.fitter, fit, others), fit.jacobian * spread))
         return known[1]
 
-    def _fit_best(self, scored) -> None:
+    def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
         """Fit the best sets for a few steps, and the best of these to the end."""
         order = sorted(scored.values(), key=lambda item: -item[0])
         begun = self.fitter.fit(
@@ -197,21 +220,21 @@ class Selection:
         begun.sort(key=lambda fit: -fit.log_evidence)
         self._fit([fit.effects for fit in begun[:self.settings.refits]])
 
-    def _fit(self, sets) -> None:
+    def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
         for fit in self.fitter.fit(sets, self._metric()):
             self._keep(self.fitter.along(fit))
 
-    def _metric(self):
+    def _metric(self) -> Point:
         """Return the covariance in whose units fits are made: the expected discrepancy's."""
         return self.covariance.points[1]
 
-    def _keep(self, fit) -> None:
+    def _keep(self, fit: Fit) -> None:
         names = frozenset(fit.names)
         if names not in self.fits or fit.log_evidence > self.fits[names].log_evidence:
             self.fits[names] = fit
 
-    def _refine(self, size) -> None:
+    def _refine(self, size: int) -> None:
         """Give the most probable sets of a size covariances of their own, then judge all anew."""
         for _ in range(self.settings.refits):
             found = [names for names in self._ranked_of(size) if names not in self._refined]
@@ -227,7 +250,7 @@ class Selection:
         self.base = self.fits[frozenset()]
 
     def _refine_best(self) -> None:
-        """Make sure that the answer is compared with what is left if any of it is left out."""
+        """Fit what remains of the most probable sets without any one of their effects."""
         for _ in range(self.settings.most_effects):
             valid = self.valid()
             if not valid:
@@ -239,19 +262,36 @@ class Selection:
             self._fit([[effect for effect in self.fits[one].effects if effect.id in names]
                        for names in missing for one in valid if names < one][:len(missing)])
 
-    def _ranked_of(self, size) -> list[frozenset]:
+    def _ranked_of(self, size: int) -> list[frozenset[str]]:
         return [names for names in self.ranked() if len(names) == size][:self.settings.beam]
 
-    def log_posterior(self, names) -> float:
+    def log_posterior(self, names: frozenset[str]) -> float:
         """Return the logarithm of a set's posterior probability, but for a constant."""
         return self.fits[names].log_evidence / self.temper + self._odds * len(names)
 
-    def ranked(self) -> list[frozenset]:
+    def ranked(self) -> list[frozenset[str]]:
         """Return all sets that were fitted, most probable first."""
         return sorted(self.fits, key=lambda names: -self.log_posterior(names))
 
-    def error(self, names) -> float:
-        """Return the RMSE of a set on all judged rows, fitted by least squares."""
+    def error(self, names: frozenset[str]) -> float:
+        """
+        Return the RMSE of a set on all judged rows, fitted by least squares.
+
+        Parameters
+        ----------
+        names : frozenset of str
+            A set that was fitted.
+
+        Returns
+        -------
+        float
+            In the unit of the response.
+
+        Raises
+        ------
+        KeyError
+            If the set was not fitted.
+        """
         fit = self.fits[names]
         known = self._errors.get(names)
         if known is None or known[0] is not fit.predicted:
@@ -261,18 +301,18 @@ class Selection:
             self._errors[names] = known = (fit.predicted, found)
         return known[1]
 
-    def structure(self, names) -> float:
+    def noise_free_rmse(self, names: frozenset[str]) -> float:
         """Return the root mean square of a set's residual without white noise."""
-        noise = self.fits[names].point.noise
+        noise = self.fits[names].require_point().noise
         return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
 
-    def sufficient(self, names) -> bool:
-        """Whether a set leaves no more than the base model's own error could be."""
+    def sufficient(self, names: frozenset[str]) -> bool:
+        """Whether a set's residual is no larger than the base model's own error could be."""
         share = self.settings.residual_share / max(len(names), 1)
-        allowed = self.limit ** 2 + share * self.structure(frozenset()) ** 2
-        return self.structure(names) ** 2 <= allowed
+        allowed = self.rmse_95 ** 2 + share * self.noise_free_rmse(frozenset()) ** 2
+        return self.noise_free_rmse(names) ** 2 <= allowed
 
-    def valid(self) -> list[frozenset]:
+    def valid(self) -> list[frozenset[str]]:
         """
         Return the sets that may be the answer, most probable first.
 
@@ -280,15 +320,15 @@ class Selection:
         practical size and by more than the expected error of the base model, and if others stay,
         it is larger than the base model's own error could be, or these are clearly less probable.
         A single effect also has to explain more than the best of all would by chance; and no set
-        of as few effects leaves less by more than the base model's error and that of an effect's
-        equation could be.
+        of as few effects has a smaller residual, by more than the base model's error and that of an
+        effect's equation could be.
         """
         physical = [names for names in self.ranked() if not self.fits[names].implausible()]
         return [names for names in physical if self._each_matters(names)
-                and (len(names) != 1 or self.p_values.get(*names, 1.0) <= SIGNIFICANCE)
+                and (len(names) != 1 or self.p_values.get(next(iter(names)), 1.0) <= SIGNIFICANCE)
                 and not self._surpassed(names, physical)]
 
-    def _each_matters(self, names) -> bool:
+    def _each_matters(self, names: frozenset[str]) -> bool:
         error = self.error(names)
         for without in _subsets(names):
             if without not in self.fits:
@@ -301,19 +341,19 @@ class Selection:
                 return False
         return True
 
-    def _surpassed(self, names, others) -> bool:
+    def _surpassed(self, names: frozenset[str], others: Iterable[frozenset[str]]) -> bool:
         """Whether another set of as few effects predicts far better."""
         form = self.settings.form * self.error(frozenset())
         least = self.error(names) ** 2 - self.covariance.size ** 2 - form ** 2
         return least > 0.0 and any(self.error(other) ** 2 < least for other in others
                                    if 0 < len(other) <= len(names))
 
-    def _would_do(self, without, names) -> bool:
+    def _would_do(self, without: frozenset[str], names: frozenset[str]) -> bool:
         """Whether a smaller set suffices and is not clearly less probable than the larger one."""
         odds = self.log_posterior(names) - self.log_posterior(without)
         return self.sufficient(without) and odds < -math.log(self.settings.reported)
 
 
-def _subsets(names) -> list[frozenset]:
+def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
     """Return the sets that lack one of the effects named."""
     return [names - {name} for name in names]

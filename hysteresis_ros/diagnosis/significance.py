@@ -12,11 +12,11 @@ DRAWS = 400
 
 
 def block_sums(values: np.ndarray, block: np.ndarray) -> np.ndarray:
-    """Sum values (n,) by block, shape (blocks,)."""
+    """Sum values (n,) by the block (n,) that each is in, shape (blocks,)."""
     return np.bincount(block, weights=values)
 
 
-def paired_p_values(gains: np.ndarray, rng, count: int = DRAWS) -> np.ndarray:
+def paired_p_values(gains: np.ndarray, rng: np.random.Generator, count: int = DRAWS) -> np.ndarray:
     """
     Family-wise p values from gains by block, by flipping the signs of whole blocks.
 
@@ -25,13 +25,14 @@ def paired_p_values(gains: np.ndarray, rng, count: int = DRAWS) -> np.ndarray:
     gains : ndarray, shape (c, blocks)
         Reduction of the squared error in each block by each candidate.
     rng : numpy.random.Generator
-        Source of randomness.
+    count : int
+        Number of draws of the signs.
 
     Returns
     -------
     ndarray, shape (c,)
     """
-    def statistic(values):
+    def statistic(values: np.ndarray) -> np.ndarray:
         spread = np.std(values, axis=-1) + 1e-300
         return np.mean(values, axis=-1) / spread
 
@@ -41,8 +42,9 @@ def paired_p_values(gains: np.ndarray, rng, count: int = DRAWS) -> np.ndarray:
     return (1.0 + np.sum(best[None, :] >= observed[:, None], axis=1)) / (1.0 + count)
 
 
-def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray, rng,
-                  level: float = 0.95, count: int = DRAWS) -> tuple[float, float]:
+def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
+                  rng: np.random.Generator, level: float = 0.95, count: int = DRAWS
+                  ) -> tuple[float, float]:
     """
     Interval of the relative reduction of the RMSE, by a bootstrap over blocks.
 
@@ -52,6 +54,16 @@ def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray, rng,
         Residuals without and with the effect.
     block : ndarray of int, shape (n,)
         Block of every row.
+    rng : numpy.random.Generator
+    level : float
+        Probability of the interval.
+    count : int
+        Number of draws of the blocks.
+
+    Returns
+    -------
+    low, high : float
+        1 - RMSE after / RMSE before.
     """
     squares = [block_sums(values ** 2, block) for values in (before, after)]
     blocks = len(squares[0])

@@ -4,18 +4,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis import significance
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.result import Brief, Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from hysteresis_ros.diagnosis.arm_fit import Fit
 
 # Effects whose signatures agree more than this (|cosine|) cannot be told apart.
 CONFUSED = 0.9
@@ -71,26 +74,26 @@ class Diagnosis(Result):
     """
 
     verdict: str
-    missing: list
-    alternatives: list
-    ranking: list
-    sets: list
+    missing: list[str]
+    alternatives: list[list[str]]
+    ranking: list[dict[str, Any]]
+    sets: list[dict[str, Any]]
     noise_floor: float
     structural_error: float
     unexplained: float
     experiment: str
-    effects: list
+    effects: list[Effect]
     rmse_before: float
     rmse_after: float
-    not_excited: dict
+    not_excited: dict[str, str]
     event: float | None
     signal: str
-    resembles: list = dataclasses.field(default_factory=list)
-    learned: dict | None = None
+    resembles: list[str] = dataclasses.field(default_factory=list)
+    learned: dict[str, Any] | None = None
     quantity: str = ''
-    where: list = dataclasses.field(default_factory=list)
+    where: list[dict[str, Any]] = dataclasses.field(default_factory=list)
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """Return plain types for JSON."""
         content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)
                    if field.name != 'effects'}
@@ -134,7 +137,8 @@ class Diagnosis(Result):
         return ranking(self)
 
 
-def ranking_row(effect, fit, before: float, after: float, p_value: float, gain: tuple) -> dict:
+def ranking_row(effect: Effect, fit: Fit, before: float, after: float, p_value: float,
+                gain: tuple[float, float]) -> dict[str, Any]:
     """
     Return the entry of one effect by itself.
 
@@ -156,7 +160,8 @@ def ranking_row(effect, fit, before: float, after: float, p_value: float, gain: 
             'plausible': not fit.implausible()}
 
 
-def add_signatures(rows, signatures, weight_columns) -> None:
+def add_signatures(rows: Sequence[dict[str, Any]], signatures: np.ndarray,
+                   weight_columns: np.ndarray) -> None:
     """
     Say of ranked effects how much refitted weights absorb, and with what each is confused.
 
@@ -181,14 +186,15 @@ def add_signatures(rows, signatures, weight_columns) -> None:
                                 if other is not row and cosine > CONFUSED]
 
 
-def in_order(rows, missing) -> list:
+def in_order(rows: Iterable[dict[str, Any]], missing: Sequence[str]) -> list[dict[str, Any]]:
     """Return ranked effects, the missing ones first, then the plausible ones by error."""
     order = {name: position for position, name in enumerate(missing)}
     return sorted(rows, key=lambda row: (order.get(row['effect'], len(order)),
                                          not row['plausible'], row['rmse_after']))
 
 
-def next_experiment(verdict: str, names, alternatives, unobservable) -> str:
+def next_experiment(verdict: str, names: Sequence[str], alternatives: Sequence[Sequence[str]],
+                    unobservable: Mapping[str, str]) -> str:
     """
     Return what to measure next.
 

@@ -8,7 +8,8 @@ from .jit import jit
 
 
 @jit
-def pivot(gram, moment, free, passive, tolerance, rounding):
+def pivot(gram: np.ndarray, moment: np.ndarray, free: np.ndarray, passive: np.ndarray,
+          tolerance: float, rounding: float) -> tuple[np.ndarray, int]:
     """
     Minimise x @ gram @ x / 2 - moment @ x with x >= 0 except where `free`.
 
@@ -78,7 +79,7 @@ def pivot(gram, moment, free, passive, tolerance, rounding):
 
 
 @jit
-def solved(gram, moment, index):
+def solved(gram: np.ndarray, moment: np.ndarray, index: np.ndarray) -> tuple[np.ndarray, bool]:
     """
     Return the unknowns `index` (P,) that are best while all others are zero, by Cholesky.
 
