@@ -77,16 +77,16 @@ def load_model(path: AnyPath) -> MuscleModel:
 
 @overload
 def read(path: AnyPath, /, *, namespace: str | None = None,
-         settled: bool = False) -> Measurement: ...
+         settled: bool = False, columns: str = '') -> Measurement: ...
 
 
 @overload
 def read(path: AnyPath, second: AnyPath, /, *more: AnyPath, namespace: str | None = None,
-         settled: bool = False) -> list[Measurement]: ...
+         settled: bool = False, columns: str = '') -> list[Measurement]: ...
 
 
 def read(*paths: AnyPath, namespace: str | None = None,
-         settled: bool = False) -> Measurement | list[Measurement]:
+         settled: bool = False, columns: str = '') -> Measurement | list[Measurement]:
     """
     Read measurements: CSV files or rosbag2 recordings.
 
@@ -98,6 +98,8 @@ def read(*paths: AnyPath, namespace: str | None = None,
         Which arm to take from a bag that recorded several.
     settled : bool
         Of a continuous run take only the ends of its holds.
+    columns : str
+        What the columns of tables mean, as ``--columns``: ``'angle=theta:deg,time=t_ms'``.
 
     Returns
     -------
@@ -114,7 +116,7 @@ def read(*paths: AnyPath, namespace: str | None = None,
     from hysteresis_ros.measurements import read_measurement
     if not paths:
         raise MeasurementError('no measurement was given; name CSV files or bag folders')
-    found = [read_measurement(path, namespace, settled) for path in paths]
+    found = [read_measurement(path, namespace, settled, columns) for path in paths]
     return found[0] if len(found) == 1 else found
 
 
