@@ -167,10 +167,12 @@ def identify(length: Source | None = None, force: Source | None = None, *,
     IdentificationError
         If the tables do not suffice or do not fit together.
     ParameterError
-        If an effect is unknown, or effects are wanted without a length table.
+        If an effect is unknown, effects are wanted without a length table, or the arm is
+        impossible in its units.
 
     """
     from hysteresis_ros.identification import bench
+    from hysteresis_ros.model.loads import check_loads
 
     tables = {name: None if source is None else bench_table(source, name)
               for name, source in (('length', length), ('force', force))}
@@ -182,6 +184,7 @@ def identify(length: Source | None = None, force: Source | None = None, *,
         tables['length'], tables['force'], force_trials=force_trials, length_trials=length_trials,
         geometry=None if geometry is None else _geometry(geometry), levels=levels,
         operator=operator, anchored=anchored)
+    check_loads(found.model)
     if names == []:
         return found
     from hysteresis_ros.diagnosis.bench_effects import add_effects
@@ -419,7 +422,7 @@ def _geometry(geometry: Geometry) -> BicepGeometry:
     if isinstance(geometry, (str, os.PathLike)):
         return BicepGeometry.from_yaml(geometry)
     if isinstance(geometry, Mapping):
-        return BicepGeometry.from_mapping(geometry)
+        return BicepGeometry.from_written(geometry)
     return geometry
 
 
