@@ -27,3 +27,11 @@ def short_list(names: Iterable[str], most: int = 12) -> str:
     """Return names for a message, in quotes, cut off after some."""
     names = [repr(str(name)[:40]) for name in names]
     return ', '.join(names[:most]) + (', ...' if len(names) > most else '')
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> str:
+    """Return the message for a name that does not exist: what was probably meant, or all."""
+    known = list(known)
+    close = closest(name, known, 0.7)
+    return f'there is no {what} {name!r}; ' + (
+        f'did you mean {close!r}?' if close else f'there are {", ".join(known)}')

@@ -102,8 +102,7 @@ def read_table(path: Path, mapping: Collection[Mapped],
 
     """
     if path.suffix.lower() in SETTINGS:
-        raise MeasurementError(f'{path}: a {path.suffix[1:].upper()} file, no table; give a CSV '
-                               'file or a rosbag2 folder')
+        raise MeasurementError(f'{path}: {settings_in_words(path)}')
     try:
         if path.is_dir():
             raise MeasurementError(f'{path}: a folder, no table; give a CSV file')
@@ -118,6 +117,17 @@ def read_table(path: Path, mapping: Collection[Mapped],
             'UTF-8 CSV') from None
     except OSError as error:
         raise MeasurementError(f'{path}: {error.strerror or error}') from None
+
+
+def settings_in_words(path: Path) -> str:
+    """Say what a YAML or JSON file is, which is no table."""
+    with open(path, encoding='utf-8', errors='replace') as file:
+        begin = file.read(4000)
+    if re.search(r'^schema: ', begin, re.MULTILINE):
+        return 'a model of a muscle, no table; give it as the model, and as data a table or bag'
+    if re.search(r'^rosbag2_bagfile_information:', begin, re.MULTILINE):
+        return 'the metadata of a recording, no table; give its folder'
+    return (f'a {path.suffix[1:].upper()} file, no table; give a CSV file or a rosbag2 folder')
 
 
 def layout_of(path: Path) -> Layout:
