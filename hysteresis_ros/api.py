@@ -77,16 +77,16 @@ def load_model(path: AnyPath) -> MuscleModel:
 
 @overload
 def read(path: AnyPath, /, *, namespace: str | None = None,
-         settled: bool = False) -> Measurement: ...
+         settled: bool = False, columns: str = '') -> Measurement: ...
 
 
 @overload
 def read(path: AnyPath, second: AnyPath, /, *more: AnyPath, namespace: str | None = None,
-         settled: bool = False) -> list[Measurement]: ...
+         settled: bool = False, columns: str = '') -> list[Measurement]: ...
 
 
 def read(*paths: AnyPath, namespace: str | None = None,
-         settled: bool = False) -> Measurement | list[Measurement]:
+         settled: bool = False, columns: str = '') -> Measurement | list[Measurement]:
     """
     Read measurements: CSV files or rosbag2 recordings.
 
@@ -98,6 +98,8 @@ def read(*paths: AnyPath, namespace: str | None = None,
         Which arm to take from a bag that recorded several.
     settled : bool
         Of a continuous run take only the ends of its holds.
+    columns : str
+        What the columns of tables mean, as ``--columns``: ``'angle=theta:deg,time=t_ms'``.
 
     Returns
     -------
@@ -114,7 +116,7 @@ def read(*paths: AnyPath, namespace: str | None = None,
     from hysteresis_ros.measurements import read_measurement
     if not paths:
         raise MeasurementError('no measurement was given; name CSV files or bag folders')
-    found = [read_measurement(path, namespace, settled) for path in paths]
+    found = [read_measurement(path, namespace, settled, columns) for path in paths]
     return found[0] if len(found) == 1 else found
 
 
@@ -165,10 +167,12 @@ def identify(length: Source | None = None, force: Source | None = None, *,
     IdentificationError
         If the tables do not suffice or do not fit together.
     ParameterError
-        If an effect is unknown, or effects are wanted without a length table.
+        If an effect is unknown, effects are wanted without a length table, or the arm is
+        impossible in its units.
 
     """
     from hysteresis_ros.identification import bench
+    from hysteresis_ros.model.loads import check_loads
 
     tables = {name: None if source is None else bench_table(source, name)
               for name, source in (('length', length), ('force', force))}
@@ -180,6 +184,7 @@ def identify(length: Source | None = None, force: Source | None = None, *,
         tables['length'], tables['force'], force_trials=force_trials, length_trials=length_trials,
         geometry=None if geometry is None else _geometry(geometry), levels=levels,
         operator=operator, anchored=anchored)
+    check_loads(found.model)
     if names == [] or tables['length'] is None:
         return found
     from hysteresis_ros.diagnosis.bench_effects import add_effects
@@ -417,7 +422,7 @@ def _geometry(geometry: Geometry) -> BicepGeometry:
     if isinstance(geometry, (str, os.PathLike)):
         return BicepGeometry.from_yaml(geometry)
     if isinstance(geometry, Mapping):
-        return BicepGeometry.from_mapping(geometry)
+        return BicepGeometry.from_written(geometry)
     return geometry
 
 

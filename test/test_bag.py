@@ -340,3 +340,20 @@ def test_without_rosbags_the_reader_of_ros_is_used(tmp_path, monkeypatch, compre
     monkeypatch.setitem(sys.modules, 'rosbag2_py', None)
     with pytest.raises(MeasurementError, match='pip install rosbags'):
         bag_storage.open_bag(tmp_path / 'broken')
+
+
+@pytest.mark.parametrize('made, words', [
+    ([], '; it is empty'), (['notes.txt'], "but 'notes.txt'"),
+    (['run/run_0.mcap'], 'the bag is one folder deeper, such as .*run')])
+def test_a_folder_without_a_bag_says_what_it_holds(tmp_path, made, words):
+    for name in made:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text('x')
+    with pytest.raises(MeasurementError, match=f'holds no bag .*{words}'):
+        read_measurement(tmp_path)
+
+
+def test_the_metadata_of_a_bag_is_no_table(tmp_path):
+    (tmp_path / 'metadata.yaml').write_text('rosbag2_bagfile_information:\n  version: 5\n')
+    with pytest.raises(MeasurementError, match='metadata of a recording, no table; give its folder'):
+        read_measurement(tmp_path / 'metadata.yaml')

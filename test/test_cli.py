@@ -10,7 +10,7 @@ import re
 import subprocess
 import sys
 
-from hysteresis_ros.cli.common import numbers, one_line, Steps
+from hysteresis_ros.cli.common import column_map, numbers, one_line, Steps
 from hysteresis_ros.cli.main import build_parser, COMMANDS, main
 from hysteresis_ros.laboratory.experiments import write_experiment
 from hysteresis_ros.measurements import read_measurement, write_csv
@@ -231,7 +231,7 @@ BAD_TABLES = {
     'text': ('trial,step,voltage,force\n0,0,on,2\n', "line 2, column 'voltage' is 'on'"),
     'empty cell': ('trial,step,voltage,force\n0,0,,2\n', "line 2, column 'voltage' is empty"),
     'repeated step': ('trial,step,voltage,force\n0,1,1,2\n0,1,1,2\n', 'step is repeated'),
-    'semicolons': ('trial;step;voltage;force\n0;0;1;2\n', 'separated by semicolons'),
+    'bars': ('trial|step|voltage|force\n0|0|1|2\n', 'separated by bars'),
     'binary': ('\x00\x01\x02', 'binary data, no table'),
     'one long line': ('a' * 2_000_000, 'more than 999999 characters'),
     'one long cell': ('a' * 200_000 + '\n', 'line 1: field larger than field limit')}
@@ -251,14 +251,67 @@ def test_a_bad_table_is_one_line(bench, tmp_path, capsys, name, command):
     assert not (tmp_path / 'm.yaml').exists()
 
 
-def test_units_off_by_a_thousand_are_warned_about_in_one_line(bench, tmp_path, capsys):
+def test_units_off_by_a_thousand_are_refused_and_converted_as_the_line_says(
+        bench, tmp_path, capsys):
     table = read_measurement(bench / 'force.csv')
     write_csv({**table.columns, 'voltage': 1000 * table.column('voltage')}, tmp_path / 'mv.csv')
-    assert main(['compare', '--model', f'{bench}/model.yaml', '--data',
-                 f'{tmp_path}/mv.csv']) == 0
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 2 and all(line.startswith('hysteresis: warning: ') for line in lines)
-    assert 'is it in mV' in lines[0] and 'another unit' in lines[1]
+    command = ['compare', '--model', f'{bench}/model.yaml', '--json', f'{tmp_path}/j.json',
+               '--data']
+    line = failed([*command, f'{tmp_path}/mv.csv'], capsys)
+    option = re.search('is it in mV.* with (--columns voltage=voltage:mV), or confirm', line)[1]
+    assert main([*command, f'{tmp_path}/mv.csv', *option.split()]) == 0
+    converted = json.loads((tmp_path / 'j.json').read_text())
+    assert main([*command, f'{bench}/force.csv']) == 0
+    assert json.loads((tmp_path / 'j.json').read_text())['model'] == pytest.approx(
+        converted['model'], rel=1e-6)
+    assert 'warning' not in capsys.readouterr().err
+
+
+def test_tables_of_ones_own_go_through_every_command(bench, tmp_path, capsys):
+    """With names and units of their own they give what the plain ones give."""
+    force, length, arm = (read_measurement(bench / f'{name}.csv')
+                          for name in ('force', 'length', 'arm'))
+    write_csv({'trial': force.column('trial'), 'U': force.column('voltage'),
+               'F': force.column('force')}, tmp_path / 'force.csv')
+    write_csv({'trial': length.column('trial'), 'U': length.column('voltage'),
+               'F': length.column('force'), 'dz_mm': 1e3 * length.column('length')},
+              tmp_path / 'length.csv')
+    write_csv({'t': arm.time, 'trial': arm.column('trial'), 'U': arm.column('voltage'),
+               'theta': np.degrees(arm.column('angle'))}, tmp_path / 'arm.csv')
+    bench_columns = ['--columns', 'voltage=U,force=F,length=dz_mm']
+    arm_columns = ['--columns', 'angle=theta:deg,voltage=U,time=t']
+    model = f'{tmp_path}/model.yaml'
+    assert main(['identify', '--force', f'{tmp_path}/force.csv', '--length',
+                 f'{tmp_path}/length.csv', '--force-trials', '0', '--length-trials', '0-3',
+                 '--geometry', f'{bench}/geometry.yaml', *bench_columns, '-o', model]) == 0
+    voltage = np.linspace(0, 5, 9)
+    assert MuscleModel.load(model).linear.to_dict() == pytest.approx(
+        MuscleModel.load(bench / 'model.yaml').linear.to_dict(), rel=1e-6)
+    out = f'{tmp_path}/out.csv'
+    data = ['--model', model, '--data', f'{tmp_path}/arm.csv', *arm_columns]
+    assert main(['compare', *data]) == 0
+    assert main(['predict', *data, '-o', out]) == 0
+    assert read_measurement(out).column('angle') == pytest.approx(arm.column('angle'))
+    assert main(['extend', *data, '--add', 'payload_error', '-o', f'{tmp_path}/m2.yaml']) == 0
+    write_csv({'theta': np.degrees(2.0 - 0.02 * voltage)}, tmp_path / 'reference.csv')
+    assert main(['invert', '--model', model, '--reference', f'{tmp_path}/reference.csv',
+                 '--columns', 'angle=theta:deg', '-o', out]) == 0
+    assert 'is it in deg? Convert it with --columns angle=theta:deg' in failed(
+        ['invert', '--model', model, '--reference', f'{tmp_path}/reference.csv',
+         '--columns', 'angle=theta', '-o', out], capsys)
+
+
+def test_columns_lists_names_units_and_spellings(tmp_path, capsys):
+    assert main(['columns', '--json', f'{tmp_path}/c.json']) == 0
+    text = capsys.readouterr().out
+    assert re.search(r'^angle +rad +deg', text, re.MULTILINE)
+    assert re.search(r'^responses: angle, length', text, re.MULTILINE)
+    content = {entry['column']: entry for entry in json.loads(
+        (tmp_path / 'c.json').read_text())['columns']}
+    assert {'voltage', 'ambient_temperature', 'time', 'trial', 'step'} <= set(content)
+    assert content['length']['unit'] == 'm' and 'mm' in content['length']['units']
+    # The example that it prints is one that is understood.
+    assert len(column_map(re.search('--columns (angle.*)', text)[1])) == 3
 
 
 @pytest.mark.parametrize('text, words', [
@@ -278,9 +331,20 @@ def test_a_bad_model_is_one_line(bench, tmp_path, capsys, text, words):
     (['compare', '--model', 'BENCH/model.yaml', '--data', 'BENCH'],
      'holds no bag (*.mcap or *.db3); to read its tables, name the files, such as BENCH/arm.csv'),
     (['compare', '--model', 'BENCH/model.yaml', '--data', 'BENCH/model.yaml'],
-     'model.yaml: a YAML file, no table; give a CSV file or a rosbag2 folder'),
+     'model.yaml: a model of a muscle, no table; give it as the model, and as data a table or'),
+    (['compare', '--model', 'BENCH/geometry.yaml', '--data', 'BENCH/force.csv'],
+     'geometry.yaml: the geometry of an arm, not a model file'),
+    (['effects', 'thermal_lg'], "there is no effect 'thermal_lg'; did you mean 'thermal_lag'?"),
+    (['extend', '--model', 'BENCH/model.yaml', '--data', 'BENCH/arm.csv', '--add', 'payload-error',
+      '-o', 'BENCH/x.yaml'], "did you mean 'payload_error'?"),
+    (['identify', '--length', 'BENCH/length.csv', '--effects', 'stress_dependance', '-o',
+      'BENCH/x.yaml'], "did you mean 'stress_dependence'?"),
+    (['simulate', 'arm-step', '-o', 'BENCH/x'], "did you mean 'arm-steps'?"),
+    (['simulate', 'bench', '--muscle', 'brinsen', '-o', 'BENCH/x'], "did you mean 'brinson'?"),
+    (['simulate', 'bench', '--effect', 'crep', '-o', 'BENCH/x'], "did you mean 'creep'?"),
+    (['demo', '--hidden', 'termal_lag', '-o', 'BENCH/x'], "did you mean 'thermal_lag'?"),
     (['compare', '--model', 'BENCH/force.csv', '--data', 'BENCH/force.csv'],
-     'force.csv: not a model file; `hysteresis identify` writes one'),
+     "force.csv: a table ('trial,step,voltage,force'), no model file; give it as data"),
     (['compare', '--model', 'BENCH', '--data', 'BENCH/force.csv'], 'is a folder; name a file'),
     (['compare', '--model', 'BENCH/model.yaml', '--data', ''], '--data: the path is empty'),
     (['identify', '--length', 'BENCH/length.csv', '--geometry', '', '-o', 'BENCH/x.yaml'],
@@ -321,6 +385,7 @@ def test_invert_says_which_column_is_missing(bench, tmp_path, capsys):
     ['simulate', 'bench', '-o', 'x', '--effect', '=3'],
     ['simulate', 'bench', '-o', 'x', '--effect', 'creep=much'],
     ['identify', '--force', 'f', '--force-trials', '3-1', '-o', 'x'],
+    ['compare', '--model', 'm', '--data', 'd', '--columns', 'angel=theta'],
     ['identify', '--length', 'l', '--operator', 'magic', '-o', 'x']])
 def test_wrong_usage_has_status_2(arguments, capsys):
     with pytest.raises(SystemExit) as left:

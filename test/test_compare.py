@@ -4,6 +4,7 @@
 
 import dataclasses
 import json
+import re
 from types import SimpleNamespace
 
 from hysteresis_ros.comparison.compare import bench_effects, compare, ladder
@@ -12,8 +13,12 @@ from hysteresis_ros.comparison.where import (
     binned, blocks_of, correlogram, half_width, memory, number, placed)
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.measurements.columns import Column
 import numpy as np
 import pytest
+
+# The muscle of these tests is longer than one that a unit explains.
+METRES = {'length': Column('length', 'length', confirmed=True)}
 
 
 @dataclasses.dataclass
@@ -86,10 +91,12 @@ def test_errors_are_those_of_the_rows():
     (lambda t, v, up: 0.04 * np.clip((v - 1) / 2, -1, 0), 'voltage', 0.0, 1.5, -0.02)])
 def test_the_region_where_the_model_fails_is_named(error, signal, low, high, mean):
     comparison = compare(FakeModel(), [run(error)])
-    found = {region.signal: region for region in comparison.where}
+    found = {name: (region, first, last) for region in comparison.where
+             for name, first, last in (*region.same_rows,
+                                       (region.signal, region.low, region.high))}
     assert signal in found
-    region = found[signal]
-    assert region.low >= low - 1e-9 and region.high <= high + 1e-9
+    region, first, last = found[signal]
+    assert first >= low - 1e-9 and last <= high + 1e-9
     assert region.mean_residual == pytest.approx(mean, rel=0.35)
     assert region.share > 0.6
     assert comparison.where[0].share > 0.6
@@ -100,6 +107,24 @@ def test_the_region_where_the_model_fails_is_named(error, signal, low, high, mea
 def test_the_cause_ranks_before_signals_that_only_go_along():
     comparison = compare(FakeModel(), [run(lambda t, v, up: 0.05 * (v > 4.5))])
     assert comparison.where[0].signal in ('voltage', 'predicted_angle')
+
+
+def test_regions_that_are_the_same_rows_are_one():
+    """The prediction goes along with the voltage, so both name the same rows."""
+    comparison = compare(FakeModel(), [run(lambda t, v, up: 0.05 * (v > 4.5))])
+    first = comparison.where[0]
+    other, = (name for name in ('voltage', 'predicted_angle') if name != first.signal)
+    assert other in [name for name, _, _ in first.same_rows]
+    assert 'the same rows are those where ' in first.text
+    assert other not in [region.signal for region in comparison.where]
+    assert first.to_dict()['same_rows'][0]['signal'] == first.same_rows[0][0]
+
+
+def test_an_error_that_some_rows_do_not_have_is_not_everywhere():
+    comparison = compare(FakeModel(), [run(lambda t, v, up: 0.1 * np.sqrt(v / 6))])
+    text = comparison.where[0].text
+    assert 'everywhere' not in text
+    assert re.search(r'\d deg larger than predicted on average [(]-0[.]0\d+ to 5.\d+ deg[)]', text)
 
 
 def test_white_noise_has_no_region():
@@ -134,8 +159,10 @@ def test_time_since_a_step_is_a_signal_of_stepped_runs():
     angle = 2 - 0.1 * (levels[step] - lag)
     measured = Measurement.from_columns({'time': time, 'voltage': levels[step], 'angle': angle})
     comparison = compare(FakeModel(), [measured])
-    found = next(r for r in comparison.where if r.signal == 'time_since_step')
-    assert found.low < 1 and found.high < 8
+    low, high = next(part for r in comparison.where
+                     for name, *part in ((r.signal, r.low, r.high), *r.same_rows)
+                     if name == 'time_since_step')
+    assert low < 1 and high < 8
     assert comparison.settled['rows'] == 40
     assert comparison.settled['model'].rmse < 0.05 * comparison.model.rmse
     assert '40 ends of holds' in comparison.to_text()
@@ -184,10 +211,21 @@ def test_a_load_that_is_constant_in_each_recording_is_a_signal_of_all():
     def bench(load, error):
         drive = np.tile(np.linspace(0, 6, 30), 4)
         return Measurement.from_columns({'voltage': drive, 'force': np.full(120, load),
-                                         'length': (2 - 0.1 * drive + error)})
+                                         'length': (2 - 0.1 * drive + error)}, origin=METRES)
     comparison = compare(FakeModel(), [bench(1.0, 0.0), bench(5.0, 0.01)])
     assert set(comparison.signals['force']) == {1.0, 5.0}
     assert any(r.signal == 'force' and r.low == 5.0 for r in comparison.where)
+
+
+def test_a_temperature_that_does_not_change_is_no_signal():
+    """Neither in one recording, where it has the noise of its sensor, nor over several."""
+    noise = 22.0 + 0.05 * np.random.default_rng(0).standard_normal(6000)
+    noisy = run(lambda t, v, up: 0.03 * (t > 600), extra={'ambient_temperature': noise})
+    still = run(lambda t, v, up: 0.03, extra={'ambient_temperature': np.full(6000, 22.0)})
+    for recordings in ([noisy], [still, still], [noisy, still]):
+        assert 'ambient_temperature' not in compare(FakeModel(), recordings).signals
+    warm = run(lambda t, v, up: 0.03, extra={'ambient_temperature': np.full(6000, 26.0)})
+    assert 'ambient_temperature' in compare(FakeModel(), [still, warm]).signals
 
 
 def test_measurements_of_two_quantities_are_refused():
@@ -203,7 +241,9 @@ def test_measurements_of_two_quantities_are_refused():
     (1.5, 'is an extrapolation'), (1.0, None)])
 def test_a_drive_outside_the_identified_range_is_warned_about(factor, words):
     drive = factor * np.linspace(0, 6, 50)
-    measured = Measurement.from_columns({'voltage': drive, 'force': 2 - 0.1 * drive})
+    measured = Measurement.from_columns(
+        {'voltage': drive, 'force': 2 - 0.1 * drive},
+        origin={'voltage': Column('voltage', 'voltage', confirmed=True)})
     notes = [n for n in compare(FakeModel(), [measured]).warnings if 'identified' in n]
     assert [words in note for note in notes] == ([True] if words else [])
 
@@ -270,7 +310,7 @@ def test_bins_hold_all_rows_and_their_means():
 def test_direction_and_last_step_ignore_ripple():
     voltage = np.array([0, 0, 5, 5.001, 4.999, 5, 2, 2.001, 2, 6])
     measured = Measurement.from_columns(
-        {'time': np.arange(10.0), 'voltage': voltage, 'angle': np.arange(10.0)})
+        {'time': np.arange(10.0), 'voltage': voltage, 'angle': np.arange(10.0) / 2})
     last, jump = changes(measured)
     assert list(last) == [0, 0, 2, 2, 2, 2, 6, 6, 6, 9]
     np.testing.assert_allclose(jump, [0, 0, 5, 5, 5, 5, -3, -3, -3, 4])

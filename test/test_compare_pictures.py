@@ -16,7 +16,7 @@ from hysteresis_ros.report.plots import along, figures
 from hysteresis_ros.measurements import Measurement
 import numpy as np
 import pytest
-from test_compare import FakeModel, run
+from test_compare import FakeModel, METRES, run
 
 matplotlib = pytest.importorskip('matplotlib')
 pytest.importorskip('matplotlib.image')
@@ -53,7 +53,8 @@ def test_overlay_shows_measured_predicted_and_residual_in_degrees(comparison):
 def test_a_bench_table_has_its_plane(comparison):
     drive = np.tile(np.linspace(0, 6, 20), 3)
     table = Measurement.from_columns({
-        'voltage': drive, 'length': 2 - 0.1 * drive, 'force': np.repeat([1.0, 2, 3], 20)})
+        'voltage': drive, 'length': 2 - 0.1 * drive, 'force': np.repeat([1.0, 2, 3], 20)},
+        origin=METRES)
     drawn = figures(compare(FakeModel(linear=None), [table]))
     assert 'plane' in drawn and 'since_step' not in drawn
     assert drawn['plane'].axes[0].get_ylabel() == 'force [N]'

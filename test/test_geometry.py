@@ -4,6 +4,7 @@
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -99,3 +100,29 @@ def test_files_round_trip_and_say_what_is_wrong(tmp_path):
     path.write_text('a: [')
     with pytest.raises(ParameterError, match='not a YAML file'):
         BicepGeometry.from_yaml(path)
+
+
+@pytest.mark.parametrize('name, factor, unit', [
+    ('clamp_distance', 1e3, 'mm'), ('clamp_height', 1e3, 'mm'), ('anchor_height', 1e3, 'mm'),
+    ('forearm_length', 1e3, 'mm'), ('resting_length', 1e3, 'mm'), ('payload_mass', 1e3, 'g'),
+    ('forearm_mass', 1e3, 'g'), ('gravity', 1e3, 'mm/s^2')])
+def test_values_in_another_unit_are_refused_and_converted_as_the_line_says(name, factor, unit):
+    """Too large by a factor of 1000, with the unit that explains it; too small as well."""
+    mapping = GEOMETRY.to_mapping()
+    with pytest.raises(ParameterError, match=re.escape(f'is it in {unit}?')) as refused:
+        BicepGeometry.from_written({**mapping, name: factor * mapping[name]}, 'arm.yaml')
+    written = re.search(f'Write "{name}: (.*)"', str(refused.value))[1]
+    arm = BicepGeometry.from_written({**mapping, name: written})
+    assert getattr(arm, name) == pytest.approx(mapping[name])
+    with pytest.raises(ParameterError, match=f'{name} is .* which is impossible'):
+        BicepGeometry.from_written({**mapping, name: mapping[name] / 1000.0})
+
+
+def test_all_values_in_another_unit_are_named_at_once_and_a_written_unit_confirms():
+    mapping = {**GEOMETRY.to_mapping(), 'clamp_distance': 17, 'payload_mass': 100}
+    with pytest.raises(ParameterError, match='clamp_distance is 17 m, .*; payload_mass is 100 kg'):
+        BicepGeometry.from_written(mapping)
+    heavy = BicepGeometry.from_written({**GEOMETRY.to_mapping(), 'payload_mass': '20 kg'})
+    assert heavy.payload_mass == 20.0
+    with pytest.raises(ParameterError, match="payload_mass: 'stone' is none of kg, g"):
+        BicepGeometry.from_written({**mapping, 'payload_mass': '2 stone'})

@@ -4,11 +4,13 @@
 
 import dataclasses
 
+from hysteresis_ros import api
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.cli.main import main
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import length_error
+from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import experiment_tables, write_experiment
 from hysteresis_ros.laboratory.linkage import GEOMETRY
@@ -107,3 +109,12 @@ def test_a_clean_arm_is_not_faulty_by_a_bench_of_two_loads(two_loads):
     recording, = tables(['train.csv'], 'arm-steps')
     found = diagnose(two_loads, [recording.select([0, 1])], seed=1)
     assert found.verdict in ('adequate', 'not_excited')
+
+
+@pytest.mark.parametrize('name, factor', [('payload_mass', 100.0), ('forearm_length', 16.0)])
+def test_an_arm_whose_loads_are_of_another_order_is_refused(name, factor):
+    """Values that are possible by themselves, with loads that no bench of this muscle had."""
+    length, force = tables()
+    arm = {**GEOMETRY, name: factor * GEOMETRY[name]}
+    with pytest.raises(ParameterError, match='pulls each muscle with about .* is a mass in g'):
+        api.identify(length, force, geometry=arm)

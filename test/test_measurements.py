@@ -87,17 +87,37 @@ def test_a_step_may_take_several_rows_of_a_sampled_run():
 
 
 @pytest.mark.parametrize('columns, words', [
-    ({'voltage': [0, 6000], 'force': [0.5, 15]}, 'voltage reaches 6000; is it in mV'),
-    ({'voltage': [0, 0.006], 'force': [0.5, 15]}, 'voltage reaches 0.006; is it in kV'),
-    ({'voltage': [0, 6], 'force': [500, 15000]}, 'force reaches 1.5e[+]04; is it in mN'),
-    ({'voltage': [0, 6], 'force': [3, 3], 'length': [0, -12]}, 'length reaches 12; is it in mm'),
-    (arm(angle=[90, 80, 70, 90, 70, 80]), 'angle reaches 90; is it in degrees'),
-    (arm(ambient_temperature=[293.0] * 6), 'ambient_temperature reaches 293; is it in kelvin'),
-    (arm(time=[0, 1e5, 2e5, 0, 1e5, 2e5]), 'is time in ms')])
-def test_units_that_are_off_by_a_thousand_are_warned_about(columns, words):
+    ({'voltage': [0, 6000], 'force': [0.5, 15]}, 'voltage reaches 6000 V, .* is it in mV'),
+    ({'voltage': [0, 6], 'force': [500, 15000]}, 'force reaches 1.5e[+]04 N, .* is it in mN'),
+    ({'voltage': [0, 6], 'force': [3, 3], 'length': [0, -12]}, 'reaches 12 m, .* is it in mm'),
+    ({'voltage': [0, 6], 'strain': [0, 4]}, 'strain reaches 4 as a ratio, .* is it in %'),
+    (arm(angle=[90, 80, 70, 90, 70, 80]), 'angle reaches 90 rad, .* is it in deg'),
+    (arm(ambient_temperature=[293.0] * 6), 'ambient_temperature reaches 293 degC, .* is it in K'),
+    (arm(time=[0, 1e5, 2e5, 0, 1e5, 2e5]), r'a trial takes 2e\+05 s, .* is it in ms')])
+def test_values_that_are_impossible_in_their_unit_are_refused(columns, words):
+    with pytest.raises(MeasurementError, match=words):
+        Measurement.from_columns(columns)
+
+
+@pytest.mark.parametrize('columns, words', [
+    ({'voltage': [0, 0.006], 'force': [0.5, 15]}, 'voltage reaches only 0.006 V; is it in kV'),
+    ({'temperature': [20, 90], 'stress': [0, 400], 'strain': [0, 0.01]},
+     'stress reaches only 400 Pa; is it in MPa')])
+def test_values_that_are_unlikely_in_their_unit_are_warned_about(columns, words):
     found = Measurement.from_columns(columns).warnings
     assert len(found) == 1
     assert re.search(words, found[0])
+
+
+def test_all_problems_of_a_table_are_said_at_once():
+    columns = arm(angle=[90, 80, 70, 90, 70, 80], time=[0, 30, 20, 0, 30, 60], voltage=[6000] * 6)
+    with pytest.raises(MeasurementError) as refused:
+        Measurement.from_columns(columns, 'run.csv')
+    text = str(refused.value)
+    assert text.startswith('run.csv: 3 problems: (1) time goes backwards') and '\n' not in text
+    assert '(2) ' in text and 'is it in deg' in text and 'is it in mV' in text
+    with pytest.raises(MeasurementError, match='2 problems: .*the drive.*the response'):
+        Measurement.from_columns({'speed': [1, 2]})
 
 
 def test_usual_values_and_a_name_that_is_almost_right():

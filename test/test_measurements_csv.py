@@ -66,8 +66,9 @@ def test_a_trial_of_one_row(written):
     (HEADER + ROWS + '90,0,2', 'line 5 has 3 cells, the header 4; the file seems to be cut off'),
     (HEADER + '0,0,1,5,1,2\n1,0,1,6,1,3\n', 'line 2 has 6 cells, the header 4; use a dot'),
     (ROWS, 'line 1 holds numbers; the first line has to name the columns'),
-    (HEADER.replace(',', ';') + ROWS.replace(',', ';'), 'separated by semicolons'),
-    (HEADER.replace(',', '\t') + ROWS.replace(',', '\t'), 'separated by tabs'),
+    (HEADER.replace(',', '|') + ROWS.replace(',', '|'), 'separated by bars'),
+    ('# ' + HEADER + ROWS, "line 2 holds numbers.*Is that '# time,trial,.*Remove the #"),
+    ('# ' + HEADER, 'nothing but comments'),
     ('time,trial,voltage,voltage\n' + ROWS, "two columns 'voltage'"),
     ('time,,voltage,angle\n' + ROWS, 'column 2 has no name'),
     ('time,trial,voltage,angel\n' + ROWS, "is 'angel' meant to be 'angle'"),
@@ -96,9 +97,83 @@ def test_a_column_of_text_is_left_out_with_a_warning(written):
     assert list(table.column('voltage')) == [0, 1]
 
 
-def test_millimetres_are_warned_about(written):
-    with pytest.warns(MeasurementWarning, match='length reaches 12; is it in mm'):
-        read_measurement(written('voltage,force,length\n0,3,-12\n1,3,2\n'))
+def test_millimetres_are_refused_with_the_option_that_converts_them(written):
+    path = written('voltage,force,length\n0,3,-12\n1,3,2\n')
+    with pytest.raises(MeasurementError, match='--columns length=length:mm') as refused:
+        read_measurement(path)
+    assert 'confirm it with --columns length=length:m' in str(refused.value)
+    table = read_measurement(path, columns='length=length:mm')
+    assert list(table.column('length')) == pytest.approx([-0.012, 0.002])
+    assert list(read_measurement(path, columns='length=length:m').column('length')) == [-12, 2]
+
+
+@pytest.mark.parametrize('header, rows', [
+    (HEADER.replace(',', ';'), ROWS.replace(',', ';')),
+    (HEADER.replace(',', ';'), ROWS.replace(',', ';').replace('.', ',')),
+    (HEADER.replace(',', '\t'), ROWS.replace(',', '\t').replace('.', ',')),
+    ('# from the bench\n' + HEADER, '# begin\n' + ROWS + '  # "end"\n'),
+    ('time [s],trial,Voltage (mV),angle_deg\n', '0,0,0,85.94367\n30,0,1e3,80.21409\n'
+     '60,0,2e3,68.75494\n'),
+    ('"time [ms]";"trial [-]";"voltage [V]";"angle [°]"\n', '0;0;0;85,94367\n3e4;0;1;80,21409\n'
+     '6e4;0;2;68,75494\n')])
+def test_tables_as_instruments_and_spreadsheets_write_them(written, header, rows):
+    table = read_measurement(written(header + rows))
+    assert (table.kind, table.warnings) == ('arm', ())
+    for name, expected in (('time', [0, 30, 60]), ('voltage', [0, 1, 2]),
+                           ('angle', [1.5, 1.4, 1.2])):
+        np.testing.assert_allclose(table.column(name), expected, atol=1e-6)
+
+
+def test_columns_with_names_of_their_own_are_mapped(written):
+    path = written('t_s,V,theta_deg,T: air\n0,0,90,300\n30,1,45,301\n')
+    table = read_measurement(
+        path, columns='angle=theta_deg:deg, voltage=V,time=t_s,ambient_temperature=T: air:K')
+    np.testing.assert_allclose(table.column('angle'), [np.pi / 2, np.pi / 4])
+    np.testing.assert_allclose(table.column('ambient_temperature'), [26.85, 27.85])
+    assert list(table.column('voltage')) == [0, 1] and list(table.time) == [0, 30]
+    # The unit that ends the header counts where none is given.
+    again = read_measurement(path, columns='angle=theta_deg,voltage=V,time=t_s')
+    np.testing.assert_allclose(again.column('angle'), table.column('angle'))
+
+
+def test_what_is_mapped_comes_before_a_column_with_the_name_itself(written):
+    path = written('time,voltage,angle,filtered\n0,0,9,1.5\n30,1,9,1.4\n')
+    assert list(read_measurement(path, columns='angle=filtered').column('angle')) == [1.5, 1.4]
+
+
+@pytest.mark.parametrize('columns, words', [
+    ('angle', 'not of the form name=column'), ('=x', 'not of the form'),
+    ('angel=theta', "no column 'angel'; did you mean 'angle'"),
+    ('angle=angle,angle=theta', 'angle is given twice'),
+    ('angle=thetta', "no column 'thetta'; did you mean 'theta'"),
+    ('angle=theta:turns', "'turns' is no unit of angle that is known; there are rad, deg")])
+def test_a_mapping_that_makes_no_sense_is_refused(written, columns, words):
+    path = written('time,voltage,theta\n0,0,1.5\n30,1,1.4\n')
+    with pytest.raises(MeasurementError, match=words):
+        read_measurement(path, columns=columns)
+
+
+@pytest.mark.parametrize('header, words', [
+    ('time,voltage [counts],angle\n', "'counts' is no unit of voltage"),
+    ('time,angle_rad,angle_deg,voltage\n', "'angle_rad' and 'angle_deg' both mean angle")])
+def test_headers_with_units_that_cannot_be_understood_are_refused(written, header, words):
+    row = '1,' * header.count(',') + '1\n'
+    with pytest.raises(MeasurementError, match=words):
+        read_measurement(written(header + row))
+
+
+def test_all_problems_of_a_file_are_said_in_one_line(written):
+    path = written('time,trial,voltage,angle\n0,0,,90\n30,0,off,80\n60,0,1,nan\n90,0\n')
+    with pytest.raises(MeasurementError) as refused:
+        read_measurement(path)
+    text = str(refused.value)
+    assert text.startswith(f'{path}: 5 problems: (1) line 2, ') and '\n' not in text
+    for words in ("'voltage' is empty", "is 'off'", "line 4, column 'angle' is nan",
+                  'line 5 has 2 cells', 'angle reaches 90 rad'):
+        assert words in text
+    many = written(HEADER + 30 * '0,0,,1\n')
+    with pytest.raises(MeasurementError, match='30 problems: .* and 22 more$'):
+        read_measurement(many)
 
 
 def test_a_name_that_looks_like_an_address_is_a_file(written, monkeypatch):
@@ -108,7 +183,7 @@ def test_a_name_that_looks_like_an_address_is_a_file(written, monkeypatch):
 
 
 @settings(max_examples=40, deadline=None)
-@given(strategies.lists(strategies.floats(-1e3, 1e3), min_size=2, max_size=30))
+@given(strategies.lists(strategies.floats(-500, 500), min_size=2, max_size=30))
 def test_what_is_written_is_read_back(tmp_path_factory, values):
     path = tmp_path_factory.mktemp('table') / 'table.csv'
     columns = {'trial': np.zeros(len(values)), 'step': np.arange(len(values)),

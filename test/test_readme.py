@@ -5,6 +5,7 @@
 import inspect
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 
@@ -15,6 +16,7 @@ import pytest
 from hysteresis_ros.cli.main import COMMANDS, main
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.errors import ModelFileError
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.measurements.csv import write_csv
 
@@ -138,6 +140,18 @@ def test_the_effect_of_the_readme_is_fitted_and_explained_like_any_other(own_eff
     assert extension.train['rmse_after'] < 0.02 * extension.train['rmse_before']
     assert main(['effects', 'contact_resistance']) == 0
     assert 'tighten the clamp' in capsys.readouterr().out
+
+
+def test_a_model_whose_effect_is_not_installed_names_the_package(own_effect, tmp_path, monkeypatch):
+    """Somebody else's model file with the effect of the README."""
+    model = bicep_model()
+    model.with_effects([own_effect(model.surroundings, p=0.2)]).save(tmp_path / 'model.yaml')
+    assert model.load(tmp_path / 'model.yaml').effects[0].values['p'] == 0.2
+    shutil.rmtree(tmp_path / 'my_package-1.0.dist-info')
+    catalogue.cache_clear()
+    with pytest.raises(ModelFileError, match='package my-package, which is not installed; install '
+                                             'it .pip install my-package.'):
+        model.load(tmp_path / 'model.yaml')
 
 
 def test_commands_and_effects_that_the_text_names_exist(readme):

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 import yaml
 
+from hysteresis_ros.bicep.geometry_units import in_si
 from hysteresis_ros.errors import ParameterError, RangeError
 
 # The arm is left this much short of the two dead centres, where the moment arm vanishes.
@@ -112,6 +113,25 @@ class BicepGeometry:
             raise ParameterError(f'{source}: {error}') from None
 
     @classmethod
+    def from_written(cls, mapping: Mapping[str, Any],
+                     source: str = 'geometry') -> 'BicepGeometry':
+        """
+        Build from values that a person has written, with a look at their units.
+
+        They are in m, kg and m/s^2, or text with a unit, such as ``17 mm``.
+
+        Raises
+        ------
+        ParameterError
+            As `from_mapping`, and for values that no arm has, which another unit explains.
+        """
+        try:
+            converted = in_si(mapping)
+        except ParameterError as error:
+            raise ParameterError(f'{source}: {error}') from None
+        return cls.from_mapping(converted, source)
+
+    @classmethod
     def from_yaml(cls, path: str | os.PathLike[str]) -> 'BicepGeometry':
         """
         Read a plain YAML mapping, or a ROS 2 parameter file with ``ros__parameters``.
@@ -119,7 +139,7 @@ class BicepGeometry:
         Raises
         ------
         ParameterError
-            If the file is no such mapping.
+            If the file is no such mapping, and as `from_written`.
         """
         try:
             content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
@@ -133,7 +153,7 @@ class BicepGeometry:
                     section.get('ros__parameters'), Mapping):
                 content = section['ros__parameters']
                 break
-        return cls.from_mapping(content, source=str(path))
+        return cls.from_written(content, source=str(path))
 
     def to_mapping(self) -> dict[str, float]:
         """Return the fields as plain numbers, ready for YAML."""

@@ -3,7 +3,7 @@
 """What several commands share: reading files, progress, writing results."""
 
 import argparse
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 import json
 import sys
 from typing import Any, TextIO, TYPE_CHECKING, TypeVar
@@ -12,7 +12,8 @@ import numpy as np
 
 from hysteresis_ros.atomic import AnyPath, write_text
 from hysteresis_ros.cli.outputs import InputPath, OutputFile, OutputFileOrStdout
-from hysteresis_ros.measurements import Measurement, read_measurement
+from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.measurements import Mapped, Measurement, parse_columns, read_measurement
 
 if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
@@ -65,6 +66,22 @@ def add_data(parser: argparse.ArgumentParser, name: str = '--data', required: bo
                         help='CSV files or rosbag2 folders')
     parser.add_argument('--namespace', metavar='NS',
                         help='which arm to take from a bag that recorded several')
+    add_columns(parser)
+
+
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    """Add the option that says what the columns of a table mean."""
+    parser.add_argument('--columns', type=column_map, default=(), metavar='NAME=COLUMN[:UNIT],...',
+                        help='what the columns of the tables mean, such as '
+                        'angle=theta:deg,time=t_ms; `hysteresis columns` lists names and units')
+
+
+def column_map(text: str) -> tuple[Mapped, ...]:
+    """Read the option `--columns`; argparse.ArgumentTypeError if it makes no sense."""
+    try:
+        return parse_columns(text)
+    except MeasurementError as error:
+        raise argparse.ArgumentTypeError(str(error).removeprefix('--columns: ')) from None
 
 
 def add_model(parser: argparse.ArgumentParser) -> None:
@@ -92,7 +109,7 @@ def add_report(parser: argparse.ArgumentParser) -> None:
 
 
 def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
-             settled: bool = False) -> list[Measurement]:
+             settled: bool = False, columns: Collection[Mapped] = ()) -> list[Measurement]:
     """
     Read measurements.
 
@@ -102,6 +119,8 @@ def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
     namespace : str, optional
     settled : bool
         Reduce continuous runs to the ends of their holds.
+    columns : collection of Mapped
+        What the columns of tables mean.
 
     Returns
     -------
@@ -113,7 +132,31 @@ def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
         If one cannot be read, or has no settled states.
 
     """
-    return [read_measurement(path, namespace, settled) for path in progress(paths, 'reading')]
+    return [read_measurement(path, namespace, settled, columns)
+            for path in progress(paths, 'reading')]
+
+
+def bench_tables(args: argparse.Namespace) -> tuple[Measurement | None, Measurement | None]:
+    """
+    Read the tables of --length and --force, which share the option --columns.
+
+    Returns
+    -------
+    length, force : Measurement or None
+        None for what was not given.
+
+    """
+    from hysteresis_ros.api import bench_table, BENCH_RESPONSES
+
+    found = []
+    for argument in ('length', 'force'):
+        path = getattr(args, argument)
+        # A force table has no length, so what the option says of it is not meant for it.
+        columns = [entry for entry in args.columns
+                   if argument == 'length' or entry.name not in BENCH_RESPONSES['length']]
+        found.append(None if path is None
+                     else bench_table(read_measurement(path, columns=columns), argument))
+    return found[0], found[1]
 
 
 def progress(items: Iterable[Item], what: str, total: int | None = None) -> Iterable[Item]:

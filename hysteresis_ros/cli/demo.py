@@ -18,6 +18,7 @@ from hysteresis_ros.cli.common import add_json, progress, say, Subparsers, write
 from hysteresis_ros.cli.outputs import OutputFolder
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements import Measurement, settled_rows
+from hysteresis_ros.spelling import unknown
 
 if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
@@ -175,8 +176,7 @@ def drawn(args: argparse.Namespace) -> str | None:
     if args.hidden is None or args.hidden in EFFECTS:
         return args.hidden
     if args.hidden != 'random':
-        raise ParameterError(f'--hidden: there is no effect {args.hidden!r}; there are '
-                             + ', '.join(EFFECTS))
+        raise ParameterError(f'--hidden: {unknown("effect", args.hidden, EFFECTS)}')
     return str(np.random.default_rng([args.seed, 77]).choice([*SETTLED, *PASSING]))
 
 

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> None:
     from hysteresis_ros.api import diagnose, load_model
 
     model = load_model(args.model)
-    measurements = read_all(args.data, args.namespace, args.settled)
+    measurements = read_all(args.data, args.namespace, args.settled, args.columns)
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed,
                      progress=lambda items, total: progress(items, 'effects', total))
     warn_of_loads(model, measurements)

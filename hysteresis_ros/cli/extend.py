@@ -9,7 +9,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_json, add_model, add_report, add_settled, read_all, say, Subparsers, write_json)
+    add_columns, add_json, add_model, add_report, add_settled, read_all, say, Subparsers,
+    write_json)
 from hysteresis_ros.cli.diagnose import UNITS
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
@@ -33,6 +34,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         help='recordings that are not fitted')
     parser.add_argument('--namespace', metavar='NS',
                         help='which arm to take from a bag that recorded several')
+    add_columns(parser)
     add_settled(parser)
     parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='MODEL.yaml')
     add_json(parser)
@@ -46,8 +48,8 @@ def run(args: argparse.Namespace) -> None:
     from hysteresis_ros.model import MuscleModel
 
     model = MuscleModel.load(args.model)
-    train = read_all(args.data, args.namespace, args.settled)
-    test = read_all(args.test, args.namespace, args.settled)
+    train = read_all(args.data, args.namespace, args.settled, args.columns)
+    test = read_all(args.test, args.namespace, args.settled, args.columns)
     names = [name.strip() for name in args.add.split(',') if name.strip()]
     extension = extend(model, names, train, test)
     extension.model.save(args.output)

@@ -9,7 +9,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_json, numbers, progress, say, Steps, Subparsers, warn, write_json)
+    add_columns, add_json, bench_tables, numbers, progress, say, Steps, Subparsers, warn,
+    write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.errors import ParameterError
 
@@ -28,6 +29,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     parser.add_argument('--force', type=InputPath, metavar='F.csv', help='force at resting length')
     parser.add_argument('--length', type=InputPath, metavar='L.csv',
                         help='length under constant loads')
+    add_columns(parser)
     parser.add_argument('--force-trials', type=numbers, metavar='0',
                         help='trials of the force table to fit (default: all)')
     parser.add_argument('--length-trials', type=numbers, metavar='0-3',
@@ -59,7 +61,8 @@ def run(args: argparse.Namespace) -> None:
         raise ParameterError('nothing to identify; give --length, --force or both')
     steps = Steps()
     steps('identifying')
-    found = identify(args.length, args.force, force_trials=args.force_trials,
+    length, force = bench_tables(args)
+    found = identify(length, force, force_trials=args.force_trials,
                      length_trials=args.length_trials, geometry=args.geometry,
                      levels=args.levels, operator=args.operator, anchored=args.anchored,
                      effects=args.effects,

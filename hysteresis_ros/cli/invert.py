@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from typing import TYPE_CHECKING
 
-from hysteresis_ros.cli.common import add_model, Subparsers
+from hysteresis_ros.cli.common import add_columns, add_model, Subparsers
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.errors import MeasurementError, ParameterError, RangeError
 import numpy as np
@@ -30,6 +30,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
         'whether it is saturated because the reference is out of reach.')
     add_model(parser)
     parser.add_argument('--reference', type=InputPath, required=True, metavar='REF.csv')
+    add_columns(parser)
     parser.add_argument('--method', choices=('preisach', 'linear'), default='preisach',
                         help='the inverse with memory (default), or that of the linear model')
     parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='VOLTS.csv')
@@ -42,7 +43,7 @@ def run(args: argparse.Namespace) -> None:
     from hysteresis_ros.model import MuscleModel
 
     model = MuscleModel.load(args.model)
-    reference = read_reference(args.reference)
+    reference = read_reference(args.reference, args.columns)
     drive, saturated = invert(model, reference, args.method)
     columns = {name: values for name, values in reference.items()
                if name not in (model.drive, 'saturated')}

@@ -8,7 +8,8 @@ import argparse
 
 from typing import TYPE_CHECKING
 
-from hysteresis_ros.cli.common import add_json, progress, say, Steps, Subparsers, write_json
+from hysteresis_ros.cli.common import (
+    add_columns, add_json, bench_tables, progress, say, Steps, Subparsers, write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     parser.add_argument('--length', type=InputPath, required=True, metavar='L.csv',
                         help='length or strain, under loads or not')
     parser.add_argument('--force', type=InputPath, metavar='F.csv', help='force at resting length')
+    add_columns(parser)
     add_json(parser)
     parser.add_argument('--plot', type=OutputFile, metavar='P.png',
                         help='draw the error over parameters and over the time of a step')
@@ -34,13 +36,12 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Do it."""
-    from hysteresis_ros.api import bench_table
     from hysteresis_ros.identification.choice import compare_operators
 
     steps = Steps()
     steps('reading')
-    force = None if args.force is None else bench_table(args.force, 'force')
-    length = bench_table(args.length, 'length')
+    length, force = bench_tables(args)
+    assert length is not None    # the option is required
     steps.clear()
     choice = compare_operators(length, force, progress=lambda items, total: progress(
         items, 'operators', total))

@@ -10,7 +10,7 @@ import os
 from typing import Any, TYPE_CHECKING
 
 from hysteresis_ros.measurements.metrics import Errors, errors, finite, Floor, noise_floor
-from hysteresis_ros.comparison.signals import signals_of
+from hysteresis_ros.comparison.signals import signals_of, varies
 from hysteresis_ros.comparison.where import blocks_of, number, regions
 from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.measurements.holds import hold_ends, mean_of_windows
@@ -374,7 +374,10 @@ def common_signals(model: MuscleModel, measurements: Sequence[Measurement],
                   and name not in names and name not in ('time', measurements[0].response)
                   and all(name in m.columns for m in measurements)]
         found = [{**m.columns, **signals} for m, signals in zip(measurements, found)]
-    return {name: np.concatenate([signals[name] for signals in found]) for name in names}
+    together = {name: np.concatenate([signals[name] for signals in found]) for name in names}
+    alone = set(measurements[0].columns) - {measurements[0].drive}
+    return {name: values for name, values in together.items()
+            if varies(values, name if name in alone else '')}
 
 
 def trial_numbers(measurements: Sequence[Measurement]) -> np.ndarray:

@@ -21,6 +21,12 @@ STEP = 3.0
 
 MOVING_SHARE = 0.2
 
+LEAST_CHANGE = {'ambient_temperature': 0.5}
+"""A recorded signal that changes by less is a constant with noise on it; in units of files."""
+
+LEAST_RELATIVE_CHANGE = 0.01
+"""The same for signals without an entry above, as a share of the largest value."""
+
 
 def signals_of(measurement: Measurement, predicted: np.ndarray,
                geometry: BicepGeometry | None = None) -> dict[str, np.ndarray]:
@@ -73,12 +79,26 @@ def signals_of(measurement: Measurement, predicted: np.ndarray,
         travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(drive)))])
         found['cycle'] = travel / (2.0 * span)
     return {name: values for name, values in found.items()
-            if np.all(np.isfinite(values)) and varies(values)}
+            if np.all(np.isfinite(values)) and varies(
+                values, name if name in measurement.columns and name != measurement.drive else '')}
 
 
-def varies(values: np.ndarray) -> bool:
-    """Tell whether a signal changes by more than rounding."""
-    return float(np.ptp(values)) > 1e-9 * max(float(np.max(np.abs(values))), 1e-300)
+def varies(values: np.ndarray, recorded: str = '') -> bool:
+    """
+    Tell whether a signal changes.
+
+    Parameters
+    ----------
+    values : ndarray, (rows,)
+    recorded : str
+        Name of a signal that has noise of its own, such as the temperature of the air; others
+        change if they change by more than rounding.
+
+    """
+    largest = max(float(np.max(np.abs(values))), 1e-300)
+    least = LEAST_CHANGE.get(recorded, (LEAST_RELATIVE_CHANGE if recorded in QUANTITIES
+                                        and recorded != 'time' else 1e-9) * largest)
+    return float(np.ptp(values)) > least
 
 
 def changes(measurement: Measurement) -> tuple[np.ndarray, np.ndarray]:

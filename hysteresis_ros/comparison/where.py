@@ -8,7 +8,7 @@ number suggests. Its interval is therefore taken between blocks of the recording
 than the residual's memory, not between rows.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from hysteresis_ros.measurements.metrics import finite
@@ -21,7 +21,11 @@ FEWEST_ROWS = 4
 FEWEST_BLOCKS = 12
 LEAST_SHARE = 0.05
 MOST_REGIONS = 8
+SAME_ROWS = 0.9
+"""Two regions that share more of their rows than this are one."""
 CONFIDENCE = 0.95
+TAIL, EVERYWHERE = 0.02, 0.5
+"""An error is one everywhere if all but this share of the rows have this share of its mean."""
 
 
 class Bins(NamedTuple):
@@ -73,6 +77,8 @@ class Region(NamedTuple):
         Of the squared error of all rows that this region's rows make up.
     text : str
         The same in words.
+    same_rows : tuple of (str, float, float)
+        Other signals that single out the same rows, each with its part.
 
     """
 
@@ -84,12 +90,15 @@ class Region(NamedTuple):
     rows: int
     share: float
     text: str
+    same_rows: tuple[tuple[str, float, float], ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of `where` in the JSON of compare."""
         return {'signal': self.signal, 'from': finite(self.low), 'to': finite(self.high),
                 'mean_residual': finite(self.mean_residual), 'rmse': finite(self.rmse),
-                'rows': int(self.rows), 'share': finite(self.share), 'text': self.text}
+                'rows': int(self.rows), 'share': finite(self.share), 'text': self.text,
+                'same_rows': [{'signal': name, 'from': finite(low), 'to': finite(high)}
+                              for name, low, high in self.same_rows]}
 
 
 def blocks_of(residual: np.ndarray, trial: np.ndarray) -> np.ndarray:
@@ -243,8 +252,9 @@ def regions(signals: Mapping[str, np.ndarray], residual: np.ndarray, block: np.n
     Returns
     -------
     list of Region
-        At most one a signal. Empty if the residual is the same everywhere; a residual that is
-        off everywhere by much the same is one region over the whole range of the first signal.
+        At most one a signal, and one for signals that single out the same rows: its text names
+        them all. Empty if the residual is the same everywhere; a residual that is off everywhere by
+        much the same is one region over the whole range of the first signal.
 
     """
     total = float(np.sum(residual ** 2))
@@ -257,12 +267,57 @@ def regions(signals: Mapping[str, np.ndarray], residual: np.ndarray, block: np.n
         if best is not None and best[0] > LEAST_SHARE * total:
             score, first, last = best[:3]
             inside = (values >= bins.low[first]) & (values <= bins.high[last])
-            scored.append((score, region(name, bins.low[first], bins.high[last],
-                                         residual[inside], total, len(residual), quantity)))
+            scored.append((score, inside, region(
+                name, bins.low[first], bins.high[last], residual[inside], total, len(residual),
+                quantity)))
     scored.sort(key=lambda item: -item[0])
-    found = [item for _, item in scored[:MOST_REGIONS]]
     overall = offset_everywhere(signals, residual, block, quantity, total)
+    everything = np.full(len(residual), overall is not None)
+    found = [one for rows, one in united(scored) if not same_rows(rows, everything)]
+    found = found[:MOST_REGIONS]
     return ([overall] if overall else []) + found
+
+
+def united(scored: Sequence[tuple[float, np.ndarray, Region]]) -> list[
+        tuple[np.ndarray, Region]]:
+    """
+    Make one region of those that are the same rows, seen in several signals.
+
+    Parameters
+    ----------
+    scored : sequence of (float, ndarray of bool (rows,), Region)
+        Worst first.
+
+    Returns
+    -------
+    list of (ndarray of bool (rows,), Region)
+        The worst of each group, with where the others are in its text.
+
+    """
+    groups: list[tuple[np.ndarray, list[Region]]] = []
+    for _, inside, one in scored:
+        for rows, members in groups:
+            if same_rows(rows, inside):
+                members.append(one)
+                break
+        else:
+            groups.append((inside, [one]))
+    return [(rows, with_others(members[0], members[1:])) for rows, members in groups]
+
+
+def same_rows(one: np.ndarray, other: np.ndarray) -> bool:
+    """Tell whether two regions, ndarray of bool (rows,), are the same rows but for a few."""
+    return bool(np.sum(one & other) >= SAME_ROWS * np.sum(one | other))
+
+
+def with_others(one: Region, others: Sequence[Region]) -> Region:
+    """Return a region that also names the signals which single out the same rows."""
+    if not others:
+        return one
+    places = ', '.join(placed(other.signal, other.low, other.high) for other in others)
+    return one._replace(text=f'{one.text}; the same rows are those {places}',
+                        same_rows=tuple((other.signal, other.low, other.high)
+                                        for other in others))
 
 
 def worst_run(bins: Bins, overall: float) -> tuple[float, int, int, bool] | None:
@@ -332,7 +387,10 @@ def region(name: str, low: float, high: float, residual: np.ndarray, total: floa
     else:
         error = (f'the measured {quantity} is {number(abs(scale * mean))} {unit} '
                  f'{what if mean > 0 else less} than predicted')
-    place = 'everywhere' if whole else placed(name, low, high)
+    least, most = float(np.min(residual)), float(np.max(residual))
+    everywhere = np.quantile(np.sign(mean) * residual, TAIL) > EVERYWHERE * abs(mean)
+    place = placed(name, low, high) if not whole else 'everywhere' if everywhere else (
+        f'on average ({number(scale * least)} to {number(scale * most)} {unit})')
     text = (f'{error} {place}' + ('' if whole else f': {100 * share:.0f} % of the squared error '
             f'in {100 * len(residual) / rows:.0f} % of the rows'))
     return Region(name, float(low), float(high), mean, rmse, len(residual), share, text)

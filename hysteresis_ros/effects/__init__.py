@@ -3,10 +3,11 @@
 """The catalogue of physical effects that a model may be missing."""
 
 from hysteresis_ros.effects.base import Effect, Inputs, Parameter, STAGES, Surroundings
-from hysteresis_ros.effects.catalogue import catalogue, effect_class
+from hysteresis_ros.effects.catalogue import catalogue, effect_class, package_of
 from hysteresis_ros.effects.stages import (
     DriveEffect, MaterialEffect, MechanismEffect, SensorEffect, Statics)
 
 __all__ = [
     'STAGES', 'DriveEffect', 'Effect', 'Inputs', 'MaterialEffect', 'MechanismEffect', 'Parameter',
-    'SensorEffect', 'Statics', 'Surroundings', 'catalogue', 'effect_class']
+    'SensorEffect', 'Statics', 'Surroundings', 'catalogue', 'effect_class',
+    'package_of']

@@ -11,6 +11,7 @@ from hysteresis_ros.effects.base import Effect, STAGES
 from hysteresis_ros.effects.stages import (
     DriveEffect, MaterialEffect, MechanismEffect, SensorEffect)
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.spelling import unknown
 
 ENTRY_POINT_GROUP = 'hysteresis_ros.effects'
 
@@ -89,9 +90,19 @@ def effect_class(name: str) -> type[Effect]:
     Raises
     ------
     ParameterError
-        If there is none; the message lists those there are.
+        If there is none; the message names the one that is probably meant, or all.
     """
     effects = catalogue()
     if name not in effects:
-        raise ParameterError(f'there is no effect {name!r}; there are {", ".join(effects)}')
+        raise ParameterError(unknown('effect', name, effects))
     return effects[name]
+
+
+def package_of(effect: type[Effect]) -> str:
+    """Return the Python package that an effect was installed with, '' for our own effects."""
+    if effect.__module__.split('.')[0] == __name__.split('.')[0]:
+        return ''
+    for entry in metadata.entry_points(group=ENTRY_POINT_GROUP):
+        if entry.value == f'{effect.__module__}:{effect.__qualname__}' and entry.dist:
+            return entry.dist.name
+    return effect.__module__.split('.')[0]

@@ -24,6 +24,7 @@ from hysteresis_ros.laboratory.bench import HOLD
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import BRISK, Plant
 from hysteresis_ros.measurements.csv import write_csv
+from hysteresis_ros.spelling import unknown
 
 # Weights on the bench [N]: 20 g of magnet and hooks with 100, 300, 500 and 700 g, at 9.8 m/s^2.
 LOADS = (1.176, 3.136, 5.096, 7.056)
@@ -129,8 +130,7 @@ def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
         cannot have.
     """
     if name not in EXPERIMENTS:
-        raise ParameterError(f'laboratory: there is no protocol {name!r}; '
-                             f'there are {", ".join(EXPERIMENTS)}')
+        raise ParameterError(f'laboratory: {unknown("protocol", name, EXPERIMENTS)}')
     return EXPERIMENTS[name](effects or {}, seed, muscle)
 
 

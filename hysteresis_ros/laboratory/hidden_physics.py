@@ -19,6 +19,7 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
 from hysteresis_ros.laboratory.unlisted import Unlisted, UNLISTED
+from hysteresis_ros.spelling import unknown
 
 # Specimens differ in an effect's size by up to this share.
 SPREAD = 0.15
@@ -314,8 +315,7 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, float], seed: in
     names = list(EFFECTS)
     for name, strength in effects.items():
         if name not in EFFECTS:
-            raise ParameterError(f'laboratory: there is no effect {name!r}; '
-                                 f'there are {", ".join(names)}')
+            raise ParameterError(f'laboratory: {unknown("effect", name, names)}')
         effect = EFFECTS[name]
         least = -2.0 if effect.signed else 0.0
         if not (math.isfinite(strength) and least <= strength <= 2.0):

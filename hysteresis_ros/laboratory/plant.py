@@ -33,6 +33,7 @@ from hysteresis_ros.laboratory.heat import HeatBalance
 from hysteresis_ros.laboratory.hidden_physics import apply_effects
 from hysteresis_ros.laboratory.lagoudas import LagoudasMaterial
 from hysteresis_ros.laboratory.wire import Material
+from hysteresis_ros.spelling import unknown
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -60,8 +61,7 @@ def specimen(seed: int, muscle: str = 'grains') -> Material:
         For a muscle that does not exist.
     """
     if muscle not in MUSCLES:
-        raise ParameterError(f'laboratory: there is no muscle {muscle!r}; '
-                             f'there are {", ".join(MUSCLES)}')
+        raise ParameterError(f'laboratory: {unknown("muscle", muscle, MUSCLES)}')
     return MUSCLES[muscle].specimen(np.random.default_rng([seed, 101]))
 
 

@@ -2,23 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measurements: one table type, read from CSV files or rosbag2 recordings."""
 
+from collections.abc import Collection
 import os
 from pathlib import Path
 
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.bag import is_bag, read_bag
+from hysteresis_ros.measurements.columns import Mapped, parse_columns
 from hysteresis_ros.measurements.csv import read_csv, read_reference, write_csv
 from hysteresis_ros.measurements.holds import settled_rows
 from hysteresis_ros.measurements.quantities import QUANTITIES, Quantity
 from hysteresis_ros.measurements.table import Measurement, MeasurementWarning, SETTLED_HOLD
 
 __all__ = [
-    'Measurement', 'MeasurementWarning', 'QUANTITIES', 'Quantity', 'SETTLED_HOLD', 'read_bag',
-    'read_csv', 'read_measurement', 'read_reference', 'settled_rows', 'write_csv']
+    'Mapped', 'Measurement', 'MeasurementWarning', 'parse_columns', 'QUANTITIES', 'Quantity',
+    'read_bag', 'read_csv', 'read_measurement', 'read_reference', 'SETTLED_HOLD', 'settled_rows',
+    'write_csv']
 
 
 def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
-                     settled: bool = False) -> Measurement:
+                     settled: bool = False,
+                     columns: str | Collection[Mapped] = ()) -> Measurement:
     """
     Read a CSV file or a rosbag2 recording.
 
@@ -31,6 +35,9 @@ def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
         Which arm to take from a bag that recorded several.
     settled : bool
         Of a continuous run take only the ends of its holds.
+    columns : str or collection of Mapped
+        What the columns of a table mean, such as ``angle=theta_deg:deg,time=t_s``; a recording
+        has topics and needs none.
 
     Returns
     -------
@@ -46,7 +53,8 @@ def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
     path = Path(path)
     if not path.exists():
         raise MeasurementError(f'{path}: no such file or folder')
-    found = read_bag(path, namespace) if is_bag(path) else read_csv(path)
+    mapping = parse_columns(columns) if isinstance(columns, str) else columns
+    found = read_bag(path, namespace) if is_bag(path) else read_csv(path, mapping)
     reduced = settled_rows(found) if settled else found
     if reduced is None:
         raise MeasurementError(f'{path}: the drive is not held for {SETTLED_HOLD:.0f} s at a time, '

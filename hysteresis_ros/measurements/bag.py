@@ -20,7 +20,8 @@ from hysteresis_ros.measurements.bag_storage import open_bag, Storage, SUFFIXES
 from hysteresis_ros.measurements.cdr import (
     decode_diagnostics, decode_float64, decode_temperature, JointReader)
 from hysteresis_ros.measurements.csv import digest
-from hysteresis_ros.measurements.table import Measurement, MeasurementWarning, short_list
+from hysteresis_ros.measurements.table import Measurement, MeasurementWarning
+from hysteresis_ros.spelling import short_list
 import numpy as np
 
 JOINT = 'elbow'

@@ -14,6 +14,7 @@ from typing import Protocol, TYPE_CHECKING
 
 from hysteresis_ros.atomic import AnyPath
 from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.spelling import short_list
 
 if TYPE_CHECKING:
     from rosbags.rosbag2 import Reader
@@ -94,14 +95,24 @@ def storage_of(path: Path) -> Path:
                     'ros2 bag reindex FOLDER')
             whole = files[0]
     if not files:
-        tables = sorted(p.name for p in path.glob('*.csv'))
-        raise MeasurementError(f'{path}: the folder holds no bag (*.mcap or *.db3)' + (
-            f'; to read its tables, name the files, such as {path / tables[0]}' if tables else ''))
+        raise MeasurementError(f'{path}: the folder holds no bag (*.mcap or *.db3){instead(path)}')
     if all(file.stat().st_size == 0 for file in files):
         raise MeasurementError(
             f'{path}: the bag is empty (0 bytes); its recorder was killed before it wrote. '
             'Record again and end the recorder with Ctrl-C')
     return whole
+
+
+def instead(path: Path) -> str:
+    """Say what a folder without a bag holds, and what to give instead."""
+    tables = sorted(p.name for p in path.glob('*.csv'))
+    if tables:
+        return f'; to read its tables, name the files, such as {path / tables[0]}'
+    bags = sorted(p.parent for suffix in SUFFIXES for p in path.glob(f'*/*{suffix}*'))
+    if bags:
+        return f'; the bag is one folder deeper, such as {bags[0]}'
+    names = sorted(p.name for p in path.iterdir())
+    return f' but {short_list(names, 5)}' if names else '; it is empty'
 
 
 def damaged(path: Path, error: BaseException) -> MeasurementError:

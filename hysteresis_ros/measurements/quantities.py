@@ -20,11 +20,10 @@ class Quantity(NamedTuple):
     shown_unit, shown_scale : str, float
         Unit for people, and the factor from the file's unit to it.
     least, most : float
-        The largest absolute value of a whole recording is expected between these; outside, a
-        factor of 1000 is likely. They are wide: they catch units, not unusual hardware.
-    small_unit, large_unit : str
-        What the values probably are when they are too large (a smaller unit was written) or
-        too small (a larger one was).
+        The largest absolute value of a whole recording is expected between these; outside,
+        another unit is likely. They are wide: they catch units, not unusual hardware.
+    meaning : str
+        What it is, in a few words.
 
     """
 
@@ -33,24 +32,24 @@ class Quantity(NamedTuple):
     shown_scale: float
     least: float
     most: float
-    small_unit: str
-    large_unit: str
+    meaning: str
 
 
 QUANTITIES = {
-    'voltage': Quantity('V', 'V', 1.0, 0.05, 500.0, 'mV', 'kV'),
-    'supply_voltage': Quantity('V', 'V', 1.0, 0.05, 500.0, 'mV', 'kV'),
-    'temperature': Quantity('degC', '°C', 1.0, 0.5, 2000.0, 'millidegrees', 'kilodegrees'),
-    'ambient_temperature': Quantity('degC', '°C', 1.0, 0.0, 150.0, 'kelvin or millidegrees', ''),
-    'pressure': Quantity('Pa', 'kPa', 1e-3, 1e3, 1e8, 'mPa', 'kPa, bar or MPa'),
-    'current': Quantity('A', 'A', 1.0, 1e-3, 500.0, 'mA', 'kA'),
-    'power': Quantity('W', 'W', 1.0, 1e-3, 2e4, 'mW', 'kW'),
-    'force': Quantity('N', 'N', 1.0, 0.05, 1000.0, 'mN', 'kN'),
-    'stress': Quantity('Pa', 'MPa', 1e-6, 5e4, 5e9, 'mPa', 'MPa or kPa'),
-    'length': Quantity('m', 'mm', 1e3, 1e-8, 1.0, 'mm', 'km'),
-    'strain': Quantity('', '%', 100.0, 1e-7, 1.0, 'percent or millistrain', ''),
-    'angle': Quantity('rad', 'deg', 57.29577951308232, 1e-5, 6.6, 'degrees or mrad', 'krad'),
-    'time': Quantity('s', 's', 1.0, 0.0, float('inf'), 'ms', ''),
+    'voltage': Quantity('V', 'V', 1.0, 0.05, 500.0, 'applied to the muscle'),
+    'supply_voltage': Quantity('V', 'V', 1.0, 0.05, 500.0, 'of the supply'),
+    'temperature': Quantity('degC', '°C', 1.0, 0.5, 2000.0, 'of the muscle, as its drive'),
+    'ambient_temperature': Quantity('degC', '°C', 1.0, 0.0, 150.0, 'of the air around the muscle'),
+    'pressure': Quantity('Pa', 'kPa', 1e-3, 1e3, 1e8, 'in the muscle, as its drive'),
+    'current': Quantity('A', 'A', 1.0, 1e-3, 500.0, 'through the muscle, as its drive'),
+    'power': Quantity('W', 'W', 1.0, 1e-3, 2e4, 'into the muscle, as its drive'),
+    'force': Quantity('N', 'N', 1.0, 0.05, 1000.0, 'pulling at the muscle'),
+    'stress': Quantity('Pa', 'MPa', 1e-6, 5e4, 5e9, 'pull over the cross-section'),
+    'length': Quantity('m', 'mm', 1e3, 1e-8, 1.0, 'less the resting length: longer is positive'),
+    'strain': Quantity('', '%', 100.0, 1e-7, 1.0, 'elongation over resting length'),
+    'angle': Quantity('rad', 'deg', 57.29577951308232, 1e-5, 6.6,
+                      'between forearm and upward vertical'),
+    'time': Quantity('s', 's', 1.0, 0.0, float('inf'), 'since the trial began'),
 }
 
 

@@ -6,20 +6,21 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-import difflib
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.measurements.problems import refuse
 from hysteresis_ros.measurements.quantities import DRIVES, LOADS, QUANTITIES, RESPONSES
+from hysteresis_ros.measurements.unit_checks import largest_values, unit_problems, unit_warnings
+from hysteresis_ros.spelling import closest, short_list, suggestion
 import numpy as np
 
 if TYPE_CHECKING:
+    from hysteresis_ros.measurements.columns import Column
     from numpy.typing import ArrayLike
 
 SETTLED_HOLD = 20.0
 """Rows of a run that are at least this many seconds apart are settled states."""
-
-SECONDS_OF_A_DAY = 86400.0
 
 
 class MeasurementWarning(UserWarning):
@@ -63,7 +64,8 @@ class Measurement:
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, ArrayLike], source: str = 'memory',
-                     digest: str = '', warnings: Iterable[str] = ()) -> 'Measurement':
+                     digest: str = '', warnings: Iterable[str] = (),
+                     origin: 'Mapping[str, Column] | None' = None) -> 'Measurement':
         """
         Build a measurement from columns; their names say what it is.
 
@@ -73,6 +75,9 @@ class Measurement:
             A missing `trial` column means one trial.
         source, digest, warnings
             As the attributes.
+        origin : mapping of str to Column, optional
+            How the columns of a file stood there, for messages that name the option which
+            converts them.
 
         Returns
         -------
@@ -81,7 +86,8 @@ class Measurement:
         Raises
         ------
         MeasurementError
-            If columns are missing, misnamed, of different lengths, empty, or not finite.
+            If columns are missing, misnamed, of different lengths, empty, not finite, out of
+            order, or impossible in their unit; one message says all.
 
         """
         arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
@@ -95,16 +101,20 @@ class Measurement:
         if rows == 0:
             raise MeasurementError(f'{source}: the table has no rows')
         arrays.setdefault('trial', np.zeros(rows))
+        problems = []
         for name, values in arrays.items():
             if is_known(name) and not np.all(np.isfinite(values)):
                 row = int(np.flatnonzero(~np.isfinite(values))[0])
-                raise MeasurementError(
-                    f'{source}: row {row}, column {name!r} is {values[row]}; remove the row or '
-                    'mend the value')
+                problems.append(f'row {row}, column {name!r} is {values[row]}; remove the row or '
+                                'mend the value')
         measurement = cls(kind, response, drive, load, arrays, str(source), digest)
-        check_order(measurement)
+        if not problems:
+            largest = largest_values(arrays)
+            problems = order_problems(measurement) + unit_problems(largest, origin)
+        refuse(str(source), problems)
         return replace(measurement, warnings=(
-            tuple(warnings) + name_warnings(measurement) + unit_warnings(measurement)))
+            *warnings, *name_warnings(measurement),
+            *(f'{source}: {note}' for note in unit_warnings(largest, origin))))
 
     @property
     def rows(self) -> int:
@@ -230,13 +240,10 @@ def classify(columns: Collection[str], source: str) -> tuple[str, str, str, str 
         If there is no response or no drive among the names.
 
     """
-    drive = first_of(DRIVES, columns, 'drive', source)
-    response = first_of(RESPONSES, columns, 'response', source)
+    refuse(source, missing_columns(columns))
+    drive = next(name for name in DRIVES if name in columns)
+    response = next(name for name in RESPONSES if name in columns)
     if response == 'angle':
-        if 'time' not in columns and 'step' not in columns:
-            raise MeasurementError(
-                f"{source}: an arm run needs a column 'time' in s"
-                f'{suggestion("time", columns)}')
         return 'arm', response, drive, None
     load = None
     if response != 'force':
@@ -244,35 +251,55 @@ def classify(columns: Collection[str], source: str) -> tuple[str, str, str, str 
     return 'bench', response, drive, load
 
 
-def first_of(names: Sequence[str], columns: Collection[str], role: str, source: str) -> str:
-    """Return the first of some names that is a column; MeasurementError if there is none."""
-    for name in names:
-        if name in columns:
-            return name
+def missing_columns(columns: Collection[str]) -> list[str]:
+    """
+    Return what a table lacks to be a measurement, one clause each.
+
+    Parameters
+    ----------
+    columns : collection of str
+        Their meanings.
+
+    Returns
+    -------
+    list of str
+
+    """
+    found = []
+    for names, role in ((DRIVES, 'drive'), (RESPONSES, 'response')):
+        if not any(name in columns for name in names):
+            found.append(f'no column with the {role} ({", ".join(names)}); '
+                         + meant_by(names, columns))
+    if 'angle' in columns and 'time' not in columns and 'step' not in columns:
+        found.append(f"an arm run needs a column 'time' in s{suggestion('time', columns)}")
+    return found
+
+
+def meant_by(names: Sequence[str], columns: Collection[str]) -> str:
+    """Say which column probably is one of some names, or which columns there are."""
     unknown = [name for name in columns if not is_known(name)]
     close = [(name, closest(name, unknown)) for name in names if closest(name, unknown)]
-    hint = (f'is {close[0][1]!r} meant to be {close[0][0]!r}? Rename it' if close
-            else f'the columns are {short_list(columns)}')
-    raise MeasurementError(f'{source}: no column with the {role} ({", ".join(names)}); {hint}')
+    if close:
+        name, column = close[0]
+        return (f'is {column!r} meant to be {name!r}? Rename it, or give '
+                f'--columns {name}={column}')
+    return (f'the columns are {short_list(columns)}; say which with '
+            f'--columns {names[0]}=COLUMN')
 
 
-def check_order(measurement: Measurement) -> None:
+def order_problems(measurement: Measurement) -> list[str]:
     """
-    Refuse rows whose order contradicts their trials, times or steps.
+    Return where the order of the rows contradicts their trials, times or steps.
 
-    Raises
-    ------
-    MeasurementError
-        If a trial is torn apart, time goes backwards or a step comes twice: each would make
-        the memory of the muscle a guess.
-
+    A trial that is torn apart, time that goes backwards or a step that comes twice would each make
+    the memory of the muscle a guess.
     """
+    found = []
     trials = measurement.trials
     if len(np.unique(trials)) < len(trials):
         again = next(t for n, t in enumerate(trials) if t in trials[:n])
-        raise MeasurementError(
-            f'{measurement.source}: the rows of trial {again:g} are not together; sort the file '
-            'by trial, or number the second part as a trial of its own')
+        found.append(f'the rows of trial {again:g} are not together; sort the file by trial, or '
+                     'number the second part as a trial of its own')
     same = np.diff(measurement.columns['trial']) == 0
     for name in ('time', 'step'):
         if name not in measurement.columns or (name == 'step' and measurement.time is not None):
@@ -284,10 +311,11 @@ def check_order(measurement: Measurement) -> None:
             continue
         row = int(bad[0])
         what = 'goes backwards' if values[row + 1] < values[row] else 'is repeated'
-        raise MeasurementError(
-            f'{measurement.source}: {name} {what} from row {row} ({values[row]:.9g}) to row '
+        found.append(
+            f'{name} {what} from row {row} ({values[row]:.9g}) to row '
             f'{row + 1} ({values[row + 1]:.9g}) in trial {measurement.columns["trial"][row]:g}; '
             'give every heat-and-cool cycle a trial of its own, and remove rows written twice')
+    return found
 
 
 def name_warnings(measurement: Measurement) -> tuple[str, ...]:
@@ -314,67 +342,9 @@ def name_warnings(measurement: Measurement) -> tuple[str, ...]:
     return tuple(found)
 
 
-def unit_warnings(measurement: Measurement) -> tuple[str, ...]:
-    """
-    Return what looks wrong by a factor of 1000, one line each.
-
-    Parameters
-    ----------
-    measurement : Measurement
-
-    Returns
-    -------
-    tuple of str
-
-    """
-    found = []
-    for name, quantity in QUANTITIES.items():
-        if name == 'time' or name not in measurement.columns:
-            continue
-        largest = float(np.max(np.abs(measurement.columns[name])))
-        unit = quantity.unit or '1'
-        meant = None
-        if largest > quantity.most:
-            meant = quantity.small_unit
-        elif 0 < largest < quantity.least:
-            meant = quantity.large_unit
-        if meant:
-            found.append(f'{measurement.source}: {name} reaches {largest:.4g}; is it in {meant}? '
-                         f'{unit} is expected')
-    if measurement.time is not None:
-        for trial, rows in measurement.split():
-            span = float(np.ptp(measurement.time[rows]))
-            if span > SECONDS_OF_A_DAY:
-                found.append(f'{measurement.source}: trial {trial:g} takes {span:.4g} s; is time '
-                             'in ms? s is expected')
-                break
-    return tuple(found)
-
-
 def is_known(name: str) -> bool:
     """Tell whether a column's meaning is fixed by the file format."""
     return name in QUANTITIES or name in ('trial', 'step')
-
-
-def closest(name: str, columns: Iterable[str], similarity: float = 0.6) -> str | None:
-    """Return the column whose name is most like this one, or None."""
-    lowered = {str(column).lower(): column for column in columns}
-    matches = difflib.get_close_matches(name.lower(), lowered, 1, similarity)
-    return lowered[matches[0]] if matches else None
-
-
-def suggestion(name: str, columns: Iterable[str]) -> str:
-    """Return the end of a message: the column that was probably meant, or what there is."""
-    close = closest(name, columns)
-    if close:
-        return f'; is {close!r} meant? Rename it'
-    return f'; the columns are {short_list(columns)}'
-
-
-def short_list(names: Iterable[str], most: int = 12) -> str:
-    """Return names for a message, in quotes, cut off after some."""
-    names = [repr(str(name)[:40]) for name in names]
-    return ', '.join(names[:most]) + (', ...' if len(names) > most else '')
 
 
 def trial_list(trials: Iterable[float]) -> str:

@@ -13,7 +13,8 @@ import yaml
 
 from hysteresis_ros.atomic import write_text
 from hysteresis_ros.bicep.geometry import BicepGeometry
-from hysteresis_ros.effects import Effect, effect_class, Surroundings
+from hysteresis_ros.effects import (
+    catalogue, Effect, effect_class, package_of, Surroundings)
 from hysteresis_ros.errors import HysteresisError, ModelFileError
 from hysteresis_ros.model.linear import LinearModel
 from hysteresis_ros.model.muscle import MuscleModel
@@ -23,6 +24,7 @@ SCHEMA = 1
 # No model comes near these; a file that does is no model, and could bring the parser down.
 LARGEST_FILE = 20_000_000
 DEEPEST_NESTING = 40
+TABLES = ('.csv', '.tsv')
 
 
 def to_dict(model: MuscleModel) -> dict[str, Any]:
@@ -32,7 +34,7 @@ def to_dict(model: MuscleModel) -> dict[str, Any]:
         'drive': model.drive, 'load': model.load_name, 'response': model.response,
         'sign': model.sign, 'mean_load': float(model.mean_load),
         'metrics': model.metrics,
-        'effects': [effect.to_dict() for effect in model.effects],
+        'effects': [_effect_entry(effect) for effect in model.effects],
         'geometry': model.geometry.to_mapping() if model.geometry else None,
         'ranges': {name: [float(low), float(high)]
                    for name, (low, high) in model.ranges.items()},
@@ -84,13 +86,19 @@ def load(path: str | os.PathLike[str]) -> MuscleModel:
     if Path(path).stat().st_size > LARGEST_FILE:
         raise ModelFileError(f'{path}: not a model file, it is larger than '
                              f'{LARGEST_FILE // 1_000_000} MB')
+    table = _first_line(path)
+    if Path(path).suffix.lower() in TABLES:
+        raise ModelFileError(f'{path}: a table ({table[:60]!r}), no model file; give it as data. '
+                             '`hysteresis identify` makes a model of bench tables')
     try:
         content = _parse(Path(path).read_text(encoding='utf-8'))
     except (yaml.YAMLError, ValueError, OverflowError, RecursionError) as error:
         first = ' '.join(str(error).split())
         raise ModelFileError(f'{path}: not a model file ({first[:120]})') from None
     if not isinstance(content, Mapping) or 'schema' not in content:
-        raise ModelFileError(f'{path}: not a model file; `hysteresis identify` writes one')
+        is_geometry = isinstance(content, Mapping) and {'clamp_distance', '/**'} & set(content)
+        raise ModelFileError(f'{path}: {"the geometry of an arm, " if is_geometry else ""}not a '
+                             'model file; `hysteresis identify` writes one')
     if content['schema'] != SCHEMA:
         raise ModelFileError(f'{path}: model file of schema {content["schema"]!r}, this version '
                              f'reads {SCHEMA}; identify the model again')
@@ -103,6 +111,11 @@ def load(path: str | os.PathLike[str]) -> MuscleModel:
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
         first = ' '.join(str(error).split())
         raise ModelFileError(f'{path}: damaged model file ({first[:120]})') from None
+
+
+def _first_line(path: str | os.PathLike[str]) -> str:
+    with open(path, encoding='utf-8', errors='replace') as file:
+        return file.readline(1000).strip()
 
 
 def _parse(text: str) -> Any:
@@ -153,8 +166,19 @@ def _operator(content: Mapping[str, Any] | None) -> HysteresisOperator | None:
     return None if content is None else operator_from_dict(content)
 
 
+def _effect_entry(effect: Effect) -> dict[str, Any]:
+    """Return an effect as plain types, with the package that a user has to have for it."""
+    package = package_of(type(effect))
+    return {**effect.to_dict(), **({'package': package} if package else {})}
+
+
 def _effect(entry: Mapping[str, Any], surroundings: Surroundings) -> Effect:
     parameters = entry['parameters']
+    if entry['id'] not in catalogue() and entry.get('package'):
+        raise ModelFileError(
+            f'the effect {entry["id"]!r} comes from the Python package {entry["package"]}, which is '
+            f'not installed; install it (pip install {entry["package"]}), or add the effect to a '
+            'model without it')
     effect = effect_class(entry['id'])(surroundings, **{
         name: _number(parameter['value'], name) for name, parameter in parameters.items()})
     effect.intervals = {name: (_limit(parameter['low'], name), _limit(parameter['high'], name))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hysteresis_ros.errors import ParameterError
+
 if TYPE_CHECKING:
     from hysteresis_ros.model.muscle import MuscleModel
 
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
 MARGIN = 0.02
 # Two neighbouring loads of the bench are far apart if every other gap is smaller by this factor.
 WIDE = 1.5
+# A load this many times beyond the bench's comes from a value in another unit.
+FAR_BEYOND = 10.0
 
 
 def reached_angles(model: MuscleModel) -> np.ndarray:
@@ -62,3 +66,26 @@ def uncovered_load(model: MuscleModel, theta: np.ndarray) -> (
     wide = gaps[widest] > WIDE * np.max(np.delete(gaps, widest))
     inside = arm[0] < above - margin and arm[1] > below + margin
     return (arm, (below, above), True) if wide and inside else None
+
+
+def check_loads(model: MuscleModel) -> None:
+    """
+    Refuse an arm whose loads are of another order than those of the bench.
+
+    Raises
+    ------
+    ParameterError
+        If they are, which a mass or length in another unit explains. Nothing is checked where the
+        loads of arm or bench are not known.
+    """
+    if model.geometry is None or model.response != 'length':
+        return
+    found = uncovered_load(model, np.array(model.geometry.angle_range).mean(keepdims=True))
+    if found is None:
+        return
+    arm, bench, _ = found
+    if arm[0] > FAR_BEYOND * bench[1] or arm[1] < bench[0] / FAR_BEYOND:
+        raise ParameterError(
+            f'geometry: the arm pulls each muscle with about {arm[0]:.3g} N, the bench with '
+            f'{bench[0]:.3g} to {bench[1]:.3g} N; is a mass in g or a length in mm? Give the unit '
+            'in the geometry, such as "payload_mass: 100 g", or bench tables with these loads')
