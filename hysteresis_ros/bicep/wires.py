@@ -49,7 +49,7 @@ def wires_of(operator: HysteresisOperator, offsets: tuple[float, ...], complianc
         # Of other operators the wires are elastic only beyond what H2 can give.
         inside = compliance
         operator = operator.tilted(inside)
-    table = operator.table if isinstance(operator, CompiledOperator) else None
+    table: Any = operator.table if isinstance(operator, CompiledOperator) else None
     operators, memories = with_own_memories([operator] * len(offsets))
     return (Wires(table, np.array(offsets, dtype=float), float(compliance), inside, middle,
                   tolerance), operators, memories)
