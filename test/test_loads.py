@@ -104,7 +104,6 @@ def test_commands_warn_of_loads_beyond_the_bench(two_loads, tmp_path, capsys):
         assert warning in capsys.readouterr().err
 
 
-@pytest.mark.xfail(reason='two loads say nothing of those between them')
 def test_a_clean_arm_is_not_faulty_by_a_bench_of_two_loads(two_loads):
     recording, = tables(['train.csv'], 'arm-steps')
     found = diagnose(two_loads, [recording.select([0, 1])], seed=1)
