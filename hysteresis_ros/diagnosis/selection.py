@@ -12,6 +12,7 @@ full fits.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+import functools
 import math
 from typing import TYPE_CHECKING
 
@@ -78,7 +79,8 @@ class Selection:
         self.covariance = Covariance(
             covariance(problem, self.fixed, predicted, settings), problem.clock, problem.trial,
             problem.noise, settings.scale_spread)
-        self.fitter = Fitter(problem, self.covariance, self._discrepancy)
+        self.fitter = Fitter(problem, self.covariance,
+                             functools.partial(_discrepancy_along, problem, settings))
         for drift, noise in FIRST_POINTS:
             self.covariance.add(self.covariance.start(drift, noise))
         self.covariance.add(self.covariance.fit(problem.measured - predicted))
@@ -94,11 +96,6 @@ class Selection:
         self.rmse_95 = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised
         self.p_values: dict[str, float] = {}
-
-    def _discrepancy(self, fit: Fit) -> np.ndarray:
-        """Return the discrepancy (n, n) of the base model where the arm goes with a fit."""
-        effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
-        return covariance(self.problem, effects, fit.predicted, self.settings)
 
     def run(self) -> None:
         """Score all single effects and pairs, fit the best, and grow sets from them."""
@@ -357,3 +354,10 @@ class Selection:
 def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
     """Return the sets that lack one of the effects named."""
     return [names - {name} for name in names]
+
+
+def _discrepancy_along(problem: ArmProblem, settings: Settings,
+                       fit: Fit) -> np.ndarray:
+    """Return the discrepancy (n, n) of the base model where the arm goes with a fit."""
+    effects = [*unaffected(problem.model.effects, fit.effects), *fit.effects]
+    return covariance(problem, effects, fit.predicted, settings)
