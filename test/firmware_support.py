@@ -136,15 +136,3 @@ class HostBoard:
             phase = count % 4
             self.library.host_tracks(phase in (1, 2), phase in (2, 3))
         return start + edges
-
-
-@pytest.fixture(scope='session')
-def firmware_library(tmp_path_factory):
-    """Build the firmware for this computer."""
-    return build_library(tmp_path_factory.mktemp('firmware'))
-
-
-@pytest.fixture
-def board(firmware_library):
-    """Return a board that has just been switched on."""
-    return HostBoard(firmware_library)

@@ -5,9 +5,8 @@
 import ctypes
 import re
 
-from firmware_support import (  # noqa: F401  a fixture is imported to be used
-    firmware_library, LINE_FRAME, LINE_NONE, LINE_REMARK, Number, ParsedFrame, REASONS, Text,
-    written)
+from firmware_support import (
+    build_library, LINE_FRAME, LINE_NONE, LINE_REMARK, Number, ParsedFrame, REASONS, Text, written)
 from hypothesis import example, given, strategies as st
 from hysteresis_ros.bridge.protocol import (
     BadLine, crc16, Decoder, encode, Frame, MAX_LINE, parse_line, Remark, write_number)
@@ -41,7 +40,13 @@ LINES = st.one_of(
 
 
 @pytest.fixture(scope='module')
-def parse(firmware_library):  # noqa: F811
+def firmware_library(tmp_path_factory):
+    """Build the firmware for this computer."""
+    return build_library(tmp_path_factory.mktemp('firmware'))
+
+
+@pytest.fixture(scope='module')
+def parse(firmware_library):
     """Return what decodes a stream by the firmware's code, into the host's kinds of lines."""
     def keys_of(text):
         return re.findall(r' ([a-z_]+)=', text.decode('ascii'))
@@ -77,7 +82,7 @@ def expected(stream):
 
 
 @given(st.binary(max_size=255))
-def test_crc(firmware_library, data):  # noqa: F811
+def test_crc(firmware_library, data):
     """Both ends protect a line by the same number."""
     assert firmware_library.crc16(data, len(data)) == crc16(data)
 
@@ -116,7 +121,7 @@ DECIMAL = re.compile(r'(-?)([0-9]{1,10})(?:\.([0-9]{1,10}))?')
 @example('0.0000000001')
 @example('-')
 @example('1.')
-def test_numbers(firmware_library, text):  # noqa: F811
+def test_numbers(firmware_library, text):
     """The same texts are numbers, with the same values as far as 32 bits reach."""
     data = text.encode('ascii', 'replace')
     number = Number()
@@ -139,7 +144,8 @@ def test_numbers(firmware_library, text):  # noqa: F811
     st.tuples(st.just('signed'), st.integers(-2 ** 31, 2 ** 31 - 1)),
     st.tuples(st.just('decimal'), st.tuples(st.integers(0, 2 ** 32 - 1), st.integers(1, 9)))),
     max_size=5), SEQUENCES)
-def test_the_host_reads_what_the_firmware_writes(firmware_library, kind, values, sequence):  # noqa: F811,E501
+def test_the_host_reads_what_the_firmware_writes(
+        firmware_library, kind, values, sequence):
     """Every frame arrives whole, with its CRC."""
     library = firmware_library
     library.host_start()
@@ -170,7 +176,7 @@ def test_the_host_reads_what_the_firmware_writes(firmware_library, kind, values,
     assert line == encode(kind, sequence % 300, fields)
 
 
-def test_a_line_that_would_be_too_long_is_not_sent(firmware_library):  # noqa: F811
+def test_a_line_that_would_be_too_long_is_not_sent(firmware_library):
     """Rather nothing than the half of it."""
     library = firmware_library
     library.host_start()
