@@ -176,6 +176,8 @@ def report(elf: Path, folder: Path) -> str:
     if heap:
         raise ValueError(f'{", ".join(sorted(heap))}: there is to be no heap')
     frames = read_frames(folder)
+    if 'main' not in frames:
+        raise ValueError(f'{folder}: the compiler wrote no .su files there (-fstack-usage)')
     depth, path = deepest('main', functions, frames)
     interrupt = max(deepest(name, functions, frames)[0]
                     for name in functions if name.startswith('__vector_'))

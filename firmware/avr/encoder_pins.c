@@ -31,9 +31,10 @@ ISR(PCINT2_vect)
 void encoder_pins_start(void)
 {
     PORTD |= TRACKS | INDEX;        // pulled up: a broken wire is quiet
-    state.before = (PIND & TRACKS) >> 2;
     EICRA = _BV(ISC00) | _BV(ISC10);    // at every edge
+    EIFR = _BV(INTF0) | _BV(INTF1);     // what came before that does not count
     EIMSK = _BV(INT0) | _BV(INT1);
+    state.before = (PIND & TRACKS) >> 2;
     PCMSK2 = _BV(PCINT20);
     PCICR = _BV(PCIE2);
 }
@@ -41,6 +42,9 @@ void encoder_pins_start(void)
 void hal_read_quadrature(struct quadrature *copy)
 {
     ATOMIC_BLOCK(ATOMIC_FORCEON) {
-        *copy = state;
+        copy->counts = state.counts;    // by name: the loop that copies a whole is slow
+        copy->indices = state.indices;
+        copy->latch = state.latch;
+        copy->missed = state.missed;
     }
 }

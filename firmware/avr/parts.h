@@ -18,7 +18,6 @@ extern uint8_t reset_flags;     // of the register MCUSR at the start
 void clock_start(void);
 void encoder_pins_start(void);
 void pwm_start(void);
-void pwm_tick(void);            // in the clock's interrupt, each ms
 void reset_start(void);
 void stop_start(void);
 void supply_start(void);

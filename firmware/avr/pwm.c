@@ -6,6 +6,7 @@
 // Timer 1 counts to PWM_STEPS and back, for two of them; timer 2 counts to 255 and back as often,
 // for the third, and makes up for its missing two bits by one step more in some of the periods:
 // over four ms the mean is the same. Both are correct in phase, so that 0 is low without a spike.
+#include <avr/interrupt.h>
 #include <avr/io.h>
 #include <util/atomic.h>
 
@@ -19,6 +20,14 @@ static volatile uint8_t coarse;     // steps / 4
 static volatile uint8_t fine;       // steps % 4
 static uint8_t due;                 // quarters of a step of timer 2 not given yet
 
+// In each ms of the clock.
+ISR(TIMER0_COMPB_vect)
+{
+    const uint8_t quarters = due + fine;
+    OCR2A = (uint8_t)(coarse + (quarters >> 2));
+    due = quarters & 3;
+}
+
 void pwm_start(void)
 {
     PORTB &= (uint8_t)~(GATES | LAMP);
@@ -31,13 +40,8 @@ void pwm_start(void)
     TCCR1B = _BV(WGM13) | _BV(CS11);
     TCCR2A = _BV(COM2A1) | _BV(WGM20);
     TCCR2B = _BV(CS21) | _BV(CS20);
-}
-
-void pwm_tick(void)
-{
-    due += fine;
-    OCR2A = (uint8_t)(coarse + (due >> 2));
-    due &= 3;
+    OCR0B = 1;                  // once in each period of the clock, not when that interrupts
+    TIMSK0 |= _BV(OCIE0B);
 }
 
 void hal_set_pwm(uint16_t steps)

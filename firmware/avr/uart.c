@@ -39,8 +39,8 @@ ISR(USART_UDRE_vect)
 
 void uart_start(void)
 {
-    UBRR0 = (F_CPU + 4 * BAUD) / (8 * BAUD) - 1;
     UCSR0A = _BV(U2X0);
+    UBRR0 = (F_CPU + 4 * BAUD) / (8 * BAUD) - 1;
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
     UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
 }
