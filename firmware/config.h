@@ -14,7 +14,7 @@
 #define DUTY_LIMIT_PERCENT 100
 #endif
 
-// The supply in mV that makes the converter read its full scale: 1.1 V times (100 k + 6.8 k) / 6.8 k.
+// The supply in mV at which the converter reads full scale: 1.1 V times (100 k + 6.8 k) / 6.8 k.
 // The reference of each chip is up to 10 % off: README.md says how to calibrate.
 #ifndef SUPPLY_FULL_SCALE
 #define SUPPLY_FULL_SCALE 17276

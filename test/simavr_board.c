@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The firmware's machine code in simavr: its serial port is a pseudo-terminal, its encoder, supply
-// and stop input do what comes on standard input, and what its gates get is told on standard output.
+// and stop input do what standard input says, and standard output tells what its gates get.
 //
 //   simavr_board firmware.elf
 //
