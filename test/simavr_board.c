@@ -13,7 +13,7 @@
 //   supply MILLIVOLTS   of the muscle's supply
 //   stop 0|1            open the emergency stop's contact
 //   reset               pull the chip's reset pin
-//   hang                an endless loop in the place of the next instruction, until the chip starts anew
+//   hang                an endless loop instead of the next instruction, until a reset
 //   history             ms:steps of each change of channel 1 so far
 //   state               key=value ...; what they mean is at print_state
 //
