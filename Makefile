@@ -51,7 +51,7 @@ IN_WORKSPACE := export PATH="$$PWD/$(VENV)/bin:$$PATH"; \
 	. ./$(WORKSPACE)/install/local_setup.sh; \
 	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)"
 
-.PHONY: help build demo test benchmark hidden docs clean force
+.PHONY: help build demo test benchmark hidden docs firmware clean force
 
 help:
 	@echo 'make demo       the whole system on the simulated arm: identify, drive, record, compare'
@@ -59,6 +59,7 @@ help:
 	@echo 'make benchmark  speed and accuracy, into benchmark.json'
 	@echo 'make hidden     the hidden-effect grid, into hidden.json'
 	@echo 'make docs       the pages of docs/ with the programming interface, into build/docs'
+	@echo 'make firmware   machine code for the board, see firmware/README.md'
 	@echo 'make build      the workspace alone; then: . install/local_setup.sh'
 	@echo 'make clean      remove all that make made'
 	@echo 'PYTHON= chooses the interpreter, CONSTRAINTS= a pip constraints file,'
@@ -106,7 +107,11 @@ docs: $(VENV)/made
 		-d $(WORKSPACE)/build/doctrees docs $(WORKSPACE)/build/docs
 	@echo '$(WORKSPACE)/build/docs/index.html'
 
+firmware:
+	@$(MAKE) -s -C firmware all
+	@echo 'firmware/build/firmware.hex'
+
 clean:
-	rm -rf .venv* .workspace* build install log dist demo *.egg-info
+	rm -rf firmware/build .venv* .workspace* build install log dist demo *.egg-info
 	rm -rf .pytest_cache .hypothesis .coverage benchmark.json hidden.json
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

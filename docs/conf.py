@@ -35,12 +35,18 @@ myst_heading_anchors = 3
 
 
 def take_readme(app, name, source):
-    """Make the README the page `readme`, with its links as they are from this folder."""
+    """Make the READMEs the pages `readme` and `firmware`, with their links as from this folder."""
     if name == 'readme':
         text = (ROOT / 'README.md').read_text(encoding='utf-8')
+        text = text.replace('](firmware/README.md', '](firmware.md')
         source[0] = re.sub(r'\]\(docs/', '](', re.sub(r'\]\((config/)', r'](../\1', text))
+    elif name == 'firmware':
+        text = (ROOT / 'firmware' / 'README.md').read_text(encoding='utf-8')
+        source[0] = re.sub(r'\]\((wiring|hal)', r'](../firmware/\1',
+                           text.replace('](../docs/', ']('))
     else:
-        source[0] = source[0].replace('](../README.md', '](readme.md')
+        source[0] = source[0].replace('](../README.md', '](readme.md').replace(
+            '](../firmware/README.md', '](firmware.md')
 
 
 def setup(app):

@@ -33,6 +33,10 @@ FAULTS = {
     'supply': 'the supply voltage is too low, the output is off',
     'current': 'the current is too high, the output is off',
     'encoder': 'the encoder is not connected',
+    'stop': 'the emergency stop was pressed, the output is off until it is released and the board '
+            'disabled and enabled again',
+    'counts_lost': 'the encoder turned faster than the board can count, the angle may be off; '
+                   'check it and set the counter to zero',
 }
 
 

@@ -14,8 +14,6 @@ class Settings:
 
     Attributes
     ----------
-    rows : int
-        Rows that are judged at most; a covariance of all pairs of rows costs their cube.
     prior : float
         Probability of each effect beforehand: about one of a catalogue of thirty.
     most_effects : int
@@ -48,7 +46,6 @@ class Settings:
         Random draws behind a p value.
     """
 
-    rows: int = 400
     prior: float = 0.03
     most_effects: int = 3
     beam: int = 3
