@@ -177,8 +177,7 @@ def _effect(entry: Mapping[str, Any], surroundings: Surroundings) -> Effect:
     if entry['id'] not in catalogue() and entry.get('package'):
         raise ModelFileError(
             f'the effect {entry["id"]!r} comes from the Python package {entry["package"]}, which '
-            f'is not installed; install it (pip install {entry["package"]}), or add the effect to a '
-            'model without it')
+            f'is not installed; install it (pip install {entry["package"]})')
     effect = effect_class(entry['id'])(surroundings, **{
         name: _number(parameter['value'], name) for name, parameter in parameters.items()})
     effect.intervals = {name: (_limit(parameter['low'], name), _limit(parameter['high'], name))
