@@ -9,8 +9,9 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, Subparsers,
+    add_data, add_json, add_model, add_report, add_settled, read_all, say, Subparsers,
     warn_of_loads, write_json)
+from hysteresis_ros.cli.rounds import BENCH, Rounds
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.verdict import Diagnosis
@@ -44,8 +45,9 @@ def run(args: argparse.Namespace) -> None:
 
     model = load_model(args.model)
     measurements = read_all(args.data, args.namespace, args.settled, args.columns)
-    found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed,
-                     progress=lambda items, total: progress(items, 'effects', total))
+    rounds = Rounds(BENCH)
+    found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed, progress=rounds)
+    rounds.close()
     warn_of_loads(model, measurements)
     say(args, to_text(found, measurements[-1].response))
     if args.json:
