@@ -60,8 +60,11 @@ help:
 	@echo 'make hidden     the hidden-effect grid, into hidden.json'
 	@echo 'make docs       the pages of docs/ with the programming interface, into build/docs'
 	@echo 'make firmware   machine code for the board, see firmware/README.md'
-	@echo 'make build      the workspace alone; then: . install/local_setup.sh'
+	@echo 'make build      the workspace alone; make demo builds it, too'
 	@echo 'make clean      remove all that make made'
+	@echo 'Then, for `hysteresis` and `ros2 run hysteresis_ros ...` in this shell:'
+	@echo '  . $(if $(filter .,$(WORKSPACE)),,$(WORKSPACE)/)install/local_setup.sh'
+	@echo 'or without sourcing: $(PREFIX)/bin/hysteresis --help'
 	@echo 'PYTHON= chooses the interpreter, CONSTRAINTS= a pip constraints file,'
 	@echo 'DEMO_ARGS=, PYTEST_ARGS=, HIDDEN_ARGS= are passed on, BENCHMARK_ARGS= such as --quick.'
 

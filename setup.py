@@ -10,6 +10,8 @@ import sys
 
 from setuptools import find_packages, setup
 
+from setuptools.command.install_scripts import install_scripts
+
 from distutils.command.install_data import install_data  # from setuptools: not before its import
 
 PACKAGE = 'hysteresis_ros'
@@ -27,6 +29,35 @@ exec "$(dirname "$(readlink -f "$0")")/../../bin/{name}" "$@"
 """
 
 
+# `hysteresis` on the PATH of whoever sources the workspace, which takes bin/ in.
+COMMAND = """#!/bin/sh
+exec "$(dirname "$(readlink -f "$0")")/../lib/{package}/{name}" "$@"
+"""
+
+# An executable of a workspace that is not sourced looks beside itself for the package.
+FIND_PACKAGE = """
+import os
+import sys
+
+site = os.path.join(
+    os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__)))),
+    'lib', 'python%d.%d' % sys.version_info[:2], 'site-packages')
+if os.path.isdir(site) and site not in sys.path:
+    sys.path.insert(0, site)
+"""
+
+
+class InstallScripts(install_scripts):
+    """Executables that also start where the workspace is not sourced."""
+
+    def write_script(self, script_name, contents, mode='t', *ignored):
+        """Write one; a Python script gets the lines that find the package."""
+        first, newline, rest = contents.partition('\n')
+        if isinstance(contents, str) and first.startswith('#!') and 'python' in first:
+            contents = first + newline + FIND_PACKAGE + rest
+        super().write_script(script_name, contents, mode, *ignored)
+
+
 class InstallData(install_data):
     """
     Data files; in a wheel what `ros2 run` needs, elsewhere compiled functions.
@@ -42,7 +73,14 @@ class InstallData(install_data):
         if 'bdist_wheel' in self.distribution.commands:
             self._install_launchers()
         elif not self.root:
+            self._install_command()
             self._compile()
+
+    def _install_command(self):
+        folder = os.path.join(self.install_dir, 'bin')
+        self.mkpath(folder)
+        self._write(os.path.join(folder, 'hysteresis'),
+                    COMMAND.format(package=PACKAGE, name='hysteresis'))
 
     def _compile(self):
         """Fill the cache of compiled functions, so that no node waits for it at its first start."""
@@ -57,11 +95,13 @@ class InstallData(install_data):
         folder = os.path.join(self.install_dir, 'lib', PACKAGE)
         self.mkpath(folder)
         for name in EXECUTABLES:
-            path = os.path.join(folder, name)
-            with open(path, 'w', encoding='utf-8') as launcher:
-                launcher.write(LAUNCHER.format(name=name))
-            os.chmod(path, 0o755)
-            self.outfiles.append(path)
+            self._write(os.path.join(folder, name), LAUNCHER.format(name=name))
+
+    def _write(self, path, text):
+        with open(path, 'w', encoding='utf-8') as launcher:
+            launcher.write(text)
+        os.chmod(path, 0o755)
+        self.outfiles.append(path)
 
 
 def version():
@@ -125,6 +165,6 @@ setup(
             'mypy',
         ],
     },
-    cmdclass={'install_data': InstallData},
+    cmdclass={'install_data': InstallData, 'install_scripts': InstallScripts},
     zip_safe=True,
 )

@@ -267,7 +267,7 @@ def diagnose(model: Model, data: Sources, effects: str | Sequence[str] | None = 
 
 
 def extend(model: Model, add: str | Sequence[str], data: Sources,
-           test: Sources | None = None) -> Extension:
+           test: Sources | None = None, *, force: bool = False) -> Extension:
     """
     Add effects to a model, fit them, and show the error before and after.
 
@@ -281,6 +281,8 @@ def extend(model: Model, add: str | Sequence[str], data: Sources,
         Measurements to fit.
     test : path, Measurement, mapping, or several in a list, optional
         Measurements of the same kind that are only predicted.
+    force : bool
+        Whether effects that the data cannot show are fitted, with a warning.
 
     Returns
     -------
@@ -292,12 +294,12 @@ def extend(model: Model, add: str | Sequence[str], data: Sources,
     MeasurementError
         If a measurement cannot be read, or they do not fit together.
     ParameterError
-        If an effect is unknown, named twice, already there, or cannot show in this kind of data.
+        If an effect is unknown, named twice, already there, or cannot show in the data.
 
     """
     from hysteresis_ros.diagnosis import extend as extension
     return extension.extend(_model(model), _names(add) or [], _measurements(data),
-                            [] if test is None else _measurements(test))
+                            [] if test is None else _measurements(test), force=force)
 
 
 @overload

@@ -3,6 +3,7 @@
 """The command line: what each command writes, and the one line it prints when it cannot."""
 
 import argparse
+import io
 import json
 import os
 from pathlib import Path
@@ -12,6 +13,8 @@ import sys
 
 from hysteresis_ros.cli.common import column_map, numbers, one_line, Steps
 from hysteresis_ros.cli.main import build_parser, COMMANDS, main
+from hysteresis_ros.cli.rounds import Rounds
+from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.laboratory.experiments import write_experiment
 from hysteresis_ros.measurements import read_measurement, write_csv
 from hysteresis_ros.model import MuscleModel
@@ -502,6 +505,39 @@ def test_steps_are_shown_on_a_terminal_only(capsys):
     assert 'reading ...' in terminal.text and terminal.text.endswith('\x1b[K')
     Steps()('reading')
     assert capsys.readouterr().err == ''
+
+
+def test_rounds_have_names_and_one_total_and_time(capsys):
+    """The second round goes on where the first ended, and the steps of an arm have names."""
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    def _grow_sets():
+        pass
+    rounds = Rounds(['each effect alone'], Terminal())
+    assert list(rounds(range(3), 3)) == [0, 1, 2]
+    bar, begun = rounds._bar, rounds._bar.start_t
+    assert (bar.desc, bar.n, bar.total) == ('each effect alone: ', 3, 3)
+    assert list(rounds([_grow_sets, 5], 2)) == [_grow_sets, 5]
+    assert rounds._bar is bar and bar.start_t == begun
+    assert (bar.n, bar.total) == (5, 5)
+    text = rounds.stream.getvalue()
+    rounds.close()
+    assert 'each effect alone' in text and bar.desc == 'growing sets of effects: '
+    assert list(rounds([1], 1)) == [1] and bar.desc == 'round 3: '
+    silent = Rounds()
+    assert list(silent(range(2), 2)) == [0, 1] and silent._bar is None
+
+
+def test_identify_says_what_effects_auto_does(bench, tmp_path, capsys, monkeypatch):
+    """Before it begins."""
+    def found_nothing(*args, **options):
+        assert 'each effect that a bench can show is fitted' in capsys.readouterr().out
+        raise IdentificationError('stopped here')
+    monkeypatch.setattr('hysteresis_ros.api.identify', found_nothing)
+    assert 'stopped here' in failed(['identify', '--length', f'{bench}/length.csv', '--effects',
+                                     'auto', '-o', f'{tmp_path}/m.yaml'], capsys)
 
 
 @pytest.mark.parametrize('name, operator, kind, better', [

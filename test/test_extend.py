@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.cli.main import main
-from hysteresis_ros.diagnosis.extend import extend, rmse
+from hysteresis_ros.diagnosis.extend import extend, rmse, undetermined
 from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.measurements import Measurement, write_csv
 from hysteresis_ros.model import MuscleModel
@@ -125,6 +125,32 @@ def test_names_that_make_no_sense_are_refused(base, recordings, names, words):
     model = base.with_effects([effect_of(base, 'backlash')])
     with pytest.raises(ParameterError, match=words):
         extend(model, names, recordings[:1])
+
+
+def test_an_effect_that_settled_rows_cannot_show_needs_force(base, recordings, tmp_path, capsys):
+    """A lag on settled rows: refused, and with --force fitted with warnings."""
+    with pytest.raises(ParameterError, match='cannot show thermal_lag: every row is settled.'):
+        extend(base, ['thermal_lag'], recordings[:1])
+    base.save(tmp_path / 'model.yaml')
+    write_csv(recordings[0].columns, tmp_path / 'run.csv')
+    command = ['extend', '--model', f'{tmp_path}/model.yaml', '--data', f'{tmp_path}/run.csv',
+               '--add', 'thermal_lag', '-o', f'{tmp_path}/extended.yaml']
+    assert main(command) == 1
+    assert '--force' in capsys.readouterr().err and not (tmp_path / 'extended.yaml').exists()
+    assert main([*command, '--force', '--json', f'{tmp_path}/e.json']) == 0
+    assert 'warning: these recordings cannot show thermal_lag' in capsys.readouterr().err
+    assert json.loads((tmp_path / 'e.json').read_text())['warnings']
+    assert 'thermal_lag' in [e.id for e in MuscleModel.load(tmp_path / 'extended.yaml').effects]
+
+
+def test_an_interval_that_spans_the_range_is_said_to_say_nothing(base):
+    effect = effect_of(base, 'encoder_offset', offset=2.0)
+    most = effect.parameters[0].high
+    effect.intervals = {'offset': (-2.0 * most, 3.0 * most)}
+    note, = undetermined(effect, 'arm')
+    assert 'encoder_offset.offset spans its physical range' in note
+    effect.intervals = {'offset': (1.5, 2.5)}
+    assert undetermined(effect, 'arm') == []
 
 
 def test_an_effect_that_the_bench_has_shown_is_fitted_anew_to_the_arm(base, recordings):

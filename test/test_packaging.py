@@ -95,6 +95,31 @@ def test_the_command_line_answers(prefix, tmp_path):
     assert 'identify' in done.stdout
 
 
+@pytest.mark.parametrize('path', ['bin/hysteresis', 'lib/hysteresis_ros/hysteresis'])
+def test_the_command_line_answers_where_nothing_is_sourced(prefix, tmp_path, path):
+    """The installed script finds the package beside itself."""
+    plain = {name: value for name, value in os.environ.items()
+             if name not in ('PYTHONPATH', 'AMENT_PREFIX_PATH')}
+    done = subprocess.run([prefix / path, 'columns'], cwd=tmp_path, env=plain,
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert 'ambient_temperature' in done.stdout
+
+
+def test_a_sourced_workspace_has_the_command(prefix):
+    """As the README and `make help` say."""
+    done = subprocess.run(['sh', '-c', '. ./local_setup.sh && command -v hysteresis'],
+                          cwd=prefix.parent, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == str(prefix / 'bin' / 'hysteresis'), done.stderr
+
+
+def test_make_help_says_how_to_get_the_command(root):
+    done = subprocess.run(['make', '-s', 'help'], cwd=root, capture_output=True, text=True,
+                          check=True)
+    assert '. install/local_setup.sh' in done.stdout
+    assert 'install/hysteresis_ros/bin/hysteresis' in done.stdout
+
+
 @pytest.mark.parametrize('executable', sorted(NODES))
 def test_a_node_starts_alone_and_ends_on_interrupt(prefix, tmp_path, domain_id, executable):
     """Each node comes up with its defaults and goes down on Ctrl-C, without a traceback."""

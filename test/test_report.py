@@ -9,7 +9,9 @@ from model_support import arm_run, bicep_model, effect_of, wandering_voltage
 import pytest
 
 from hysteresis_ros.diagnosis.diagnose import Diagnosis
+from hysteresis_ros.cli.diagnose import to_text
 from hysteresis_ros.diagnosis.extend import extend
+from hysteresis_ros.diagnosis.verdict import shown_or_not
 from hysteresis_ros.report.diagnosis_page import write_diagnosis, write_extension
 from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
 from hysteresis_ros.measurements import Measurement
@@ -123,7 +125,7 @@ def test_names_of_files_are_text(found_page, extended_page):
 
 def test_the_verdict_comes_first(found_page):
     """Then where it fails, the effects, the alternatives, what could not show, provenance."""
-    order = ['Missing: payload_error', 'What to do next', 'Where it fails',
+    order = ['Missing: one of payload_error, encoder_offset', 'What to do next', 'Where it fails',
              'Effects, by what they do on rows not fitted', 'Alternatives',
              'What this recording could not show', 'Before and after',
              'What the error is made of', 'Provenance']
@@ -164,7 +166,9 @@ def test_a_value_outside_its_range_is_warned_of(case, tmp_path):
 
 
 @pytest.mark.parametrize('verdict, changes, words', [
-    ('missing', {}, ['payload_error', 'cannot tell it from encoder_offset', '98 % off']),
+    ('missing', {'alternatives': [[]]}, ['Missing: payload_error. ', 'Adding it takes 98 % off']),
+    ('missing', {}, ['Missing: one of payload_error, encoder_offset. This data cannot tell them',
+                     'Adding payload_error takes 98 % off']),
     ('missing', {'missing': ['payload_error', 'backlash'], 'alternatives': [[], []]},
      ['Also missing: backlash', 'Adding them']),
     ('unknown', {'unexplained': 0.6, 'event': 1234.4}, ['60 %', 'happened at 1234 s']),
@@ -176,6 +180,29 @@ def test_the_words_say_what_was_found(verdict, changes, words):
     """Each verdict in a sentence that a person can act on."""
     text = verdict_in_words(diagnosis(verdict, **changes))
     assert all(word in text for word in words)
+
+
+def test_a_p_value_says_when_it_is_the_smallest_that_the_draws_can_give():
+    found = diagnosis(draws=400, ranking=[{**row('payload_error', 0.002), 'p_value': 1 / 401},
+                                          {**row('supply_sag', 0.05), 'p_value': 0.012}])
+    text = to_text(found, 'angle')
+    assert re.search('payload_error .* <= 0.0025 ', text)
+    assert re.search('supply_sag .* 0.012 ', text)
+    assert '<= 0.0025 is the smallest that 400 random draws can give' in text
+    assert '<= 0.0025' in found.brief().rows[0]
+    found.ranking.pop(0)
+    assert 'random draws' not in to_text(found, 'angle')
+
+
+def test_an_effect_is_not_both_ranked_and_one_that_could_not_have_shown():
+    found = shown_or_not(diagnosis(
+        not_excited={'supply_sag': 'too weak', 'payload_error': 'too weak', 'encoder_offset': '-'},
+        ranking=[{**row('payload_error', 0.002), 'confused_with': ['supply_sag', 'airflow']},
+                 row('supply_sag', 0.05)]))
+    assert [one['effect'] for one in found.ranking] == ['payload_error']
+    assert found.ranking[0]['confused_with'] == ['airflow']
+    # What is missing, or may be in its place, has shown.
+    assert found.not_excited == {'supply_sag': 'too weak'}
 
 
 def test_the_words_of_values_have_units_and_intervals_where_there_are_any():

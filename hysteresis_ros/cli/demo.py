@@ -277,7 +277,7 @@ def find_and_extend(args: argparse.Namespace, folder: Path, model: MuscleModel, 
     again = None
     result['found'] = found.missing
     if found.missing:
-        extension = extend(model, found.missing, data)
+        extension = extend(model, found.missing, data, force=True)
         extension.model.save(folder / 'extended.yaml')
         again = drive(args, folder / 'run_extended', sequences, folder / 'extended.yaml', hidden,
                       pace)

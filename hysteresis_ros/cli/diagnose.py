@@ -9,8 +9,9 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, progress, read_all, say, Subparsers,
+    add_data, add_json, add_model, add_report, add_settled, read_all, say, Subparsers,
     warn_of_loads, write_json)
+from hysteresis_ros.cli.rounds import BENCH, Rounds
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.verdict import Diagnosis
@@ -44,8 +45,9 @@ def run(args: argparse.Namespace) -> None:
 
     model = load_model(args.model)
     measurements = read_all(args.data, args.namespace, args.settled, args.columns)
-    found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed,
-                     progress=lambda items, total: progress(items, 'effects', total))
+    rounds = Rounds(BENCH)
+    found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed, progress=rounds)
+    rounds.close()
     warn_of_loads(model, measurements)
     say(args, to_text(found, measurements[-1].response))
     if args.json:
@@ -58,7 +60,8 @@ def run(args: argparse.Namespace) -> None:
 def to_text(found: Diagnosis, response: str) -> str:
     """Return the diagnosis for a terminal."""
     from hysteresis_ros.comparison.compare import layout
-    from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
+    from hysteresis_ros.report.words import (
+        draws_in_words, parameters_in_words, verdict_in_words)
 
     factor, unit = UNITS[response]
     lines = [verdict_in_words(found), '']
@@ -72,10 +75,12 @@ def to_text(found: Diagnosis, response: str) -> str:
     for row in found.ranking[:10]:
         values = parameters_in_words(row['parameters'], intervals=False)
         rows.append([row['effect'], f'{factor * row["rmse_after"]:.3g}',
-                     f'{100.0 * row["gain"]:.0f} %', f'{row["p_value"]:.3f}',
+                     f'{100.0 * row["gain"]:.0f} %', found.p_value(row),
                      f'{100.0 * row["absorbed"]:.0f} %',
                      values + ('' if row['plausible'] else ' (outside its physical range)')])
     lines += ['', *layout(rows)]
+    if draws_in_words(found):
+        lines.append(draws_in_words(found))
     if found.not_excited:
         lines += ['', 'could not have shown: ' + ', '.join(found.not_excited)]
     lines += ['', 'next: ' + found.experiment]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
     add_columns, add_json, add_model, add_report, add_settled, read_all, say, Subparsers,
-    write_json)
+    warn, write_json)
 from hysteresis_ros.cli.diagnose import UNITS
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
@@ -36,6 +36,8 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         help='which arm to take from a bag that recorded several')
     add_columns(parser)
     add_settled(parser)
+    parser.add_argument('--force', action='store_true',
+                        help='fit effects that the recordings cannot show, with a warning')
     parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='MODEL.yaml')
     add_json(parser)
     add_report(parser)
@@ -51,7 +53,9 @@ def run(args: argparse.Namespace) -> None:
     train = read_all(args.data, args.namespace, args.settled, args.columns)
     test = read_all(args.test, args.namespace, args.settled, args.columns)
     names = [name.strip() for name in args.add.split(',') if name.strip()]
-    extension = extend(model, names, train, test)
+    extension = extend(model, names, train, test, force=args.force)
+    for note in extension.warnings:
+        warn(note)
     extension.model.save(args.output)
     say(args, to_text(extension, train[0].response))
     say(args, f'\nWritten to {args.output}')

@@ -9,14 +9,18 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_columns, add_json, bench_tables, numbers, progress, say, Steps, Subparsers, warn,
+    add_columns, add_json, bench_tables, numbers, say, Steps, Subparsers, warn,
     write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
+from hysteresis_ros.cli.rounds import BENCH, Rounds
 from hysteresis_ros.errors import ParameterError
 
 if TYPE_CHECKING:
     from hysteresis_ros.identification.bench import Identified
 
+AUTO = ('--effects auto: each effect that a bench can show is fitted to the length table, alone\n'
+        'and in sets; what predicts held-out trials clearly better is kept, and what every\n'
+        'loaded muscle has where it does no harm.\n')
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
@@ -59,14 +63,16 @@ def run(args: argparse.Namespace) -> None:
 
     if args.force is None and args.length is None:
         raise ParameterError('nothing to identify; give --length, --force or both')
-    steps = Steps()
+    if args.effects == 'auto':
+        say(args, AUTO)
+    steps, rounds = Steps(), Rounds(BENCH)
     steps('identifying')
     length, force = bench_tables(args)
     found = identify(length, force, force_trials=args.force_trials,
                      length_trials=args.length_trials, geometry=args.geometry,
                      levels=args.levels, operator=args.operator, anchored=args.anchored,
-                     effects=args.effects,
-                     progress=lambda items, total: progress(items, 'effects', total))
+                     effects=args.effects, progress=rounds)
+    rounds.close()
     steps.clear()
     found.model.save(args.output)
     say(args, report(found))

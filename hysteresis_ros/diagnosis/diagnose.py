@@ -14,7 +14,7 @@ from hysteresis_ros.diagnosis.arm_verdict import arm_verdict
 from hysteresis_ros.diagnosis.bench_verdict import bench_verdict
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.settings import Settings
-from hysteresis_ros.diagnosis.verdict import Diagnosis
+from hysteresis_ros.diagnosis.verdict import Diagnosis, shown_or_not
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.workers import one_blas_thread
 
@@ -74,4 +74,5 @@ def diagnose(model: MuscleModel, measurements: Sequence[Measurement],
     rng = np.random.default_rng(seed)
     found = (bench_verdict(problem, settings, rng, jobs, progress) if problem.refits
              else arm_verdict(problem, settings, rng, progress))
-    return dataclasses.replace(found, quantity=problem.response)
+    return shown_or_not(dataclasses.replace(
+        found, quantity=problem.response, draws=settings.draws))

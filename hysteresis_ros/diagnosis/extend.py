@@ -7,13 +7,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 import dataclasses
 import hashlib
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.kind import problem_for
-from hysteresis_ros.diagnosis.observable import may_differ, present
+from hysteresis_ros.diagnosis.observable import may_differ, observable, present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
 # Of the last fit, whose values are kept.
 EVALUATIONS, TOLERANCE = 30, 1e-4
+# An interval that covers this share of a physical range says nothing.
+SPANS = 0.9
 
 # Effects with intervals, and the names of parameters outside their physical range.
 Fitted = tuple[list[Effect], list[str]]
@@ -58,6 +61,8 @@ class Extension(Result):
         Parameters outside their physical range.
     quantity : str
         What was measured: 'angle', 'length' or 'strain'.
+    warnings : list of str
+        Effects that the recordings cannot show, and parameters that they do not determine.
     """
 
     model: MuscleModel
@@ -67,6 +72,7 @@ class Extension(Result):
     steps: list[tuple[str, float]]
     implausible: list[str]
     quantity: str = ''
+    warnings: list[str] = dataclasses.field(default_factory=list)
 
     def to_dict(self) -> dict:
         """Return plain types for JSON."""
@@ -75,7 +81,7 @@ class Extension(Result):
             'parameters': {effect.id: effect.to_dict()['parameters'] for effect in self.added},
             'train': self.train, 'test': self.test,
             'steps': [{'model': name, 'rmse': value} for name, value in self.steps],
-            'implausible': self.implausible}
+            'implausible': self.implausible, 'warnings': self.warnings}
 
     def brief(self) -> Brief:
         """Return the error before and after, with the table of the parameters."""
@@ -86,6 +92,7 @@ class Extension(Result):
                   for what, error in (('fitted', self.train), ('not fitted', self.test)) if error]
         if self.implausible:
             lines.append('outside their physical range: ' + ', '.join(self.implausible))
+        lines += self.warnings[:1]
         rows = [[effect.id, name, f'{entry["value"]:.4g}', f'{entry["low"]:.4g}',
                  f'{entry["high"]:.4g}', entry['unit']] for effect in self.added
                 for name, entry in effect.to_dict()['parameters'].items()]
@@ -116,7 +123,7 @@ def rmse(model: MuscleModel, measurements: Iterable[Measurement]) -> float:
 
 @one_blas_thread()
 def extend(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],
-           test: Sequence[Measurement] = ()) -> Extension:
+           test: Sequence[Measurement] = (), *, force: bool = False) -> Extension:
     """
     Add effects and fit them together.
 
@@ -132,6 +139,8 @@ def extend(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement
         Recordings to fit.
     test : sequence of Measurement
         Recordings of the same kind that are only predicted.
+    force : bool
+        Whether effects that these recordings cannot show are fitted, with a warning.
 
     Returns
     -------
@@ -140,13 +149,16 @@ def extend(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement
     Raises
     ------
     ParameterError
-        If an effect is unknown, named twice, already there, or cannot show in this kind of data.
-        One of the wire that the bench has shown is there may be fitted anew to an arm.
+        If an effect is unknown, named twice, already there, or cannot show in this kind of data,
+        or in these recordings and is not forced. One of the wire that the bench has shown is
+        there may be fitted anew to an arm.
     MeasurementError
         If the recordings do not fit together.
     """
     problem_for(model, [*train, *test])     # which refuses what does not fit together
+    warnings = _unobservable(model, names, train, force)
     problem, classes, fits = _fitted(model, names, train)
+    warnings += [note for effect in fits[-1][0] for note in undetermined(effect, problem.kind)]
     judged = list(test) or list(train)
     models = [('base', model)]
     for kind, (effects, _) in zip(classes, fits):
@@ -163,7 +175,7 @@ def extend(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement
             return {}
         return {'rmse_before': rmse(before, recordings), 'rmse_after': rmse(extended, recordings)}
     return Extension(extended, added, both(list(train)), both(list(test)), steps,
-                     implausible, problem.response)
+                     implausible, problem.response, warnings)
 
 
 @one_blas_thread()
@@ -178,6 +190,36 @@ def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Mea
     added, _ = fits[-1]
     completed = problem.completed([*problem.model.effects, *added])
     return _stamped(completed, added, train, problem.kind), added
+
+
+def _unobservable(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],
+                  force: bool) -> list[str]:
+    """Return why recordings cannot show the effects named; refuse those that are not forced."""
+    wanted = [effect_class(name) for name in names]
+    base = model.with_effects([effect for effect in model.effects if effect.id not in names])
+    _, hidden = observable(problem_for(base, train))
+    notes = [f'these recordings cannot show {kind.id}: {hidden[kind.id]}' for kind in wanted
+             if kind.id in hidden]
+    if notes and not force:
+        experiments = '; '.join(kind.experiment for kind in wanted if kind.id in hidden)
+        raise ParameterError(f'{"; ".join(notes)}. To see it: {experiments}. --force (in Python '
+                             'force=True) fits it none the less')
+    return notes
+
+
+def undetermined(effect: Effect, kind: str) -> list[str]:
+    """Return which parameters of a fitted effect have intervals that span their whole range."""
+    found = []
+    for parameter in effect.parameters:
+        if parameter.choices or kind not in parameter.kinds:
+            continue
+        low, high = effect.intervals.get(parameter.name, (math.nan, math.nan))
+        least, most = (-parameter.high if parameter.both_signs else parameter.low), parameter.high
+        covered = min(high, most) - max(low, least)
+        if covered >= SPANS * (most - least):
+            found.append(f'the interval of {effect.id}.{parameter.name} spans its physical range: '
+                         'these recordings do not determine it')
+    return found
 
 
 def _fitted(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]

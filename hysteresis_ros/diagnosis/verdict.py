@@ -71,6 +71,8 @@ class Diagnosis(Result):
     where : list of dict
         Where the model fails, worst first, as in the JSON of `compare`; empty where no comparison
         was asked for.
+    draws : int
+        Random draws behind a p value; none can be smaller than 1 / (1 + draws). 0 if not known.
     """
 
     verdict: str
@@ -92,6 +94,7 @@ class Diagnosis(Result):
     learned: dict[str, Any] | None = None
     quantity: str = ''
     where: list[dict[str, Any]] = dataclasses.field(default_factory=list)
+    draws: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain types for JSON."""
@@ -105,7 +108,9 @@ class Diagnosis(Result):
         unit, scale = shown(self.quantity)
         first = f'Diagnosis: {self.verdict}'
         if self.missing:
-            first += ' ' + ' + '.join(self.missing)
+            first += ' ' + ' + '.join(
+                f'one of {", ".join([name, *rest])}' if rest else name
+                for name, rest in zip(self.missing, self.alternatives))
         shares = [entry['probability'] for entry in self.sets
                   if self.missing and set(entry['effects']) == set(self.missing)]
         if shares:
@@ -119,10 +124,17 @@ class Diagnosis(Result):
         if others:
             lines.insert(1, '; '.join(others))
         rows = [[row['effect'], f'{scale * row["rmse_after"]:.3g}', f'{100.0 * row["gain"]:.0f} %',
-                 f'{row["p_value"]:.3f}', 'yes' if row['plausible'] else 'no']
+                 self.p_value(row), 'yes' if row['plausible'] else 'no']
                 for row in self.ranking[:SHOWN]]
         return Brief(lines, ['effect', f'RMSE after [{unit or "1"}]', 'gain', 'p', 'plausible'],
                      rows)
+
+    def p_value(self, row: dict) -> str:
+        """Return the p value of a row of the ranking; `<=` before the least of these draws."""
+        least = 1.0 / (1.0 + self.draws)
+        if self.draws and row['p_value'] <= least * (1.0 + 1e-9):
+            return f'<= {least:.2g}'
+        return f'{row["p_value"]:.3f}'
 
     def plot(self) -> Figure:
         """
@@ -184,6 +196,20 @@ def add_signatures(rows: Sequence[dict[str, Any]], signatures: np.ndarray,
         row['absorbed'] = float(np.clip(share, 0.0, 1.0))
         row['confused_with'] = [other['effect'] for other, cosine in zip(rows, cosines)
                                 if other is not row and cosine > CONFUSED]
+
+
+def shown_or_not(found: Diagnosis) -> Diagnosis:
+    """
+    Return a diagnosis in which no effect is both ranked and one that could not have shown.
+
+    What is missing, or may be instead, has shown; of the others the reason stands.
+    """
+    named = {*found.missing, *(name for names in found.alternatives for name in names)}
+    hidden = {name: reason for name, reason in found.not_excited.items() if name not in named}
+    ranking = [{**row, 'confused_with': [name for name in row['confused_with']
+                                         if name not in hidden]}
+               for row in found.ranking if row['effect'] not in hidden]
+    return dataclasses.replace(found, ranking=ranking, not_excited=hidden)
 
 
 def in_order(rows: Iterable[dict[str, Any]], missing: Sequence[str]) -> list[dict[str, Any]]:

@@ -176,9 +176,8 @@ def _effect(entry: Mapping[str, Any], surroundings: Surroundings) -> Effect:
     parameters = entry['parameters']
     if entry['id'] not in catalogue() and entry.get('package'):
         raise ModelFileError(
-            f'the effect {entry["id"]!r} comes from the Python package {entry["package"]}, which is '
-            f'not installed; install it (pip install {entry["package"]}), or add the effect to a '
-            'model without it')
+            f'the effect {entry["id"]!r} comes from the Python package {entry["package"]}, which '
+            f'is not installed; install it (pip install {entry["package"]})')
     effect = effect_class(entry['id'])(surroundings, **{
         name: _number(parameter['value'], name) for name, parameter in parameters.items()})
     effect.intervals = {name: (_limit(parameter['low'], name), _limit(parameter['high'], name))

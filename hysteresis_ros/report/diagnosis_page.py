@@ -19,7 +19,7 @@ from hysteresis_ros.report.drawing import new_figure, png
 from hysteresis_ros.report.plots import figures, ranking
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.comparison.where import number
-from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
+from hysteresis_ros.report.words import draws_in_words, parameters_in_words, verdict_in_words
 from hysteresis_ros.measurements.quantities import shown
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def write_diagnosis(path: AnyPath, model: MuscleModel, measurements: Sequence[Me
         parts.append(page.section('Effects, by what they do on rows not fitted', page.picture(
             png(ranking(found, MOST_ROWS)),
             'Error with each effect added alone, with 95 % intervals; hollow: outside its physical '
-            'range. Dashed: the error without it.'), _ranking_table(found, scale, unit)))
+            'range. Dashed: the error without it.'), _ranking_table(found, scale, unit),
+            *([page.paragraph(draws_in_words(found) + '.')] if draws_in_words(found) else [])))
     alternatives = [f'{name} cannot be told from {", ".join(others)}' for name, others in zip(
         found.missing, found.alternatives) if others]
     hidden = [f'{name}: {reason}' for name, reason in found.not_excited.items()]
@@ -167,7 +168,7 @@ def _ranking_table(found: Diagnosis, scale: float, unit: str) -> str:
     for row in found.ranking[:MOST_ROWS]:
         values = parameters_in_words(row['parameters'])
         rows.append([row['effect'], number(scale * row['rmse_after']),
-                     f'{100.0 * row["gain"]:.0f} %', f'{row["p_value"]:.3f}',
+                     f'{100.0 * row["gain"]:.0f} %', found.p_value(row),
                      f'{100.0 * row["absorbed"]:.0f} %', 'yes' if row['plausible'] else 'no',
                      values])
     strong = [place for place, row in enumerate(found.ranking[:MOST_ROWS])

@@ -34,13 +34,15 @@ def verdict_in_words(found: Diagnosis) -> str:
     if found.verdict == 'missing':
         parts = []
         for name, others in zip(found.missing, found.alternatives):
-            text = f'{name}. {effects[name].sentence}'
+            tied = [name, *others]
             if others:
-                text += f' This data cannot tell it from {" or ".join(others)}.'
-            parts.append(text)
+                parts.append(f'one of {", ".join(tied)}. This data cannot tell them apart. '
+                             + ' '.join(f'{one}: {effects[one].sentence}' for one in tied))
+            else:
+                parts.append(f'{name}. {effects[name].sentence}')
         share = 100.0 * (1.0 - found.rmse_after / found.rmse_before)
         return ('Missing: ' + ' Also missing: '.join(parts)
-                + f' Adding {"them" if len(parts) > 1 else "it"} takes {share:.0f} % off the '
+                + f' Adding {added_in_words(found)} takes {share:.0f} % off the '
                 'error.')
     if found.verdict == 'unknown':
         if found.resembles:
@@ -59,6 +61,21 @@ def verdict_in_words(found: Diagnosis) -> str:
                 'missing.')
     return ("Adequate: no effect of the catalogue explains more than chance and the base model's "
             'own error.')
+
+
+def added_in_words(found: Diagnosis) -> str:
+    """Return what was added for the error after it: of tied effects the first."""
+    if any(found.alternatives):
+        return ' and '.join(found.missing)
+    return 'them' if len(found.missing) > 1 else 'it'
+
+
+def draws_in_words(found: Diagnosis) -> str:
+    """Say that p values are the smallest that the draws can give; '' where none is."""
+    if not any(found.p_value(row).startswith('<=') for row in found.ranking):
+        return ''
+    return (f'p <= {1.0 / (1.0 + found.draws):.2g} is the smallest that {found.draws} random draws '
+            'can give')
 
 
 def load_in_words(model: MuscleModel, theta: np.ndarray) -> str:
