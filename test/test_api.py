@@ -173,7 +173,7 @@ def test_a_data_frame_is_a_table_of_columns(folder):
 
 
 @pytest.mark.parametrize('call, error, words', [
-    (lambda folder: hr.load_model(folder / 'train.csv'), ModelFileError, 'not a model file'),
+    (lambda folder: hr.load_model(folder / 'train.csv'), ModelFileError, 'no model file'),
     (lambda folder: hr.compare(3, folder / 'train.csv'), ParameterError, 'model cannot be a int'),
     (lambda folder: hr.compare(folder / 'model.yaml', 3), ParameterError, 'cannot be a int'),
     (lambda folder: hr.compare(folder / 'model.yaml', [3]), ParameterError, 'cannot be a int'),
