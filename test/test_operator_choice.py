@@ -17,10 +17,12 @@ from hysteresis_ros.identification.choice import compare_operators, MOST_ROWS
 from hysteresis_ros.identification.operators import fit_operator
 from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.measurements import Measurement, write_csv
+from hysteresis_ros.measurements.columns import Column
 from hysteresis_ros.operators import BoucWen, Cascade, Linear, Preisach, PrandtlIshlinskii
 
 DATA = Path(__file__).parents[2] / 'shared' / 'data'
 LAGGING = BoucWen(2.0, -0.8, 1.2, 0.7, 1.5, 1.0, 0.0, 6.0)
+METRES = {'length': Column('length', 'length', confirmed=True)}
 
 
 def sequence(seed, rows=120):
@@ -33,7 +35,7 @@ def one_trial(rows=120):
     LAGGING.reset()
     return Measurement.from_columns(
         {'time': 0.1 * np.arange(rows), 'voltage': drive,
-         'length': LAGGING.simulate(np.append(0.0, drive))[1:]})
+         'length': LAGGING.simulate(np.append(0.0, drive))[1:]}, origin=METRES)
 
 
 @pytest.fixture(scope='module')
@@ -149,7 +151,7 @@ def test_long_tables_keep_their_turning_points():
     time = np.arange(20000) * 0.01
     drive = 3.0 + 3.0 * np.sin(time) * np.exp(-time / 100.0)
     table = Measurement.from_columns({'time': time, 'voltage': drive,
-                                      'length': LAGGING.simulate(drive)})
+                                      'length': LAGGING.simulate(drive)}, origin=METRES)
     choice = compare_operators(table, None, named(candidates(table, None, False)[0], 'line'))
     assert choice.rows == 20000 and choice.used < 1.2 * MOST_ROWS
 
