@@ -45,7 +45,7 @@ def extension(base, recordings):
 
 
 def test_both_effects_get_the_values_of_the_arm(extension):
-    """The intervals hold the truth, and are no wider than the bench's error of 0.4 mm makes them."""
+    """The intervals hold the truth, no wider than the bench's error of 0.4 mm makes them."""
     values = [effect.values for effect in extension.added]
     assert values[0]['dm'] == pytest.approx(15.0, abs=2.0)
     assert values[1]['offset'] == pytest.approx(2.0, abs=0.5)

@@ -115,7 +115,8 @@ def test_a_sourced_workspace_has_the_command(prefix):
 
 def test_make_help_says_how_to_get_the_command(root):
     # The make that runs this test may have been given another interpreter.
-    outside = {name: value for name, value in os.environ.items() if not name.startswith(('MAKE', 'MFLAGS'))}
+    outside = {name: value for name, value in os.environ.items()
+               if not name.startswith(('MAKE', 'MFLAGS'))}
     done = subprocess.run(['make', '-s', 'help'], cwd=root, capture_output=True, text=True,
                           check=True, env=outside)
     assert '. install/local_setup.sh' in done.stdout
