@@ -18,6 +18,7 @@ def packages(root):
     return sorted(path.parent.name for path in (root / 'hysteresis_ros').glob('*/__init__.py'))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(bool(missing), reason=f'{", ".join(missing)} not installed (extra `docs`)')
 def test_pages_build_without_warnings(root, tmp_path):
     """Docstrings, links and tables of contents are right; warnings are errors."""

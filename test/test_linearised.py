@@ -70,6 +70,7 @@ def test_an_effect_that_is_there_has_the_best_evidence():
     assert max(singles, key=lambda names: singles[names][0])[0] in (NAMES[2], NAMES[7])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('trials, rows, rho', [(4, 60, 0.0), (4, 60, 0.9), (4, 60, 0.98),
                                                (1, 60, 0.9), (1, 60, 0.98)])
 def test_autocorrelated_noise_is_seldom_taken_for_an_effect(trials, rows, rho):
