@@ -59,7 +59,8 @@ def test_the_demo_drives_the_arm_and_reads_its_bag_back(root, tmp_path, domain_i
 def test_a_hidden_lag_is_found_and_made_up_for(root, tmp_path, domain_id):
     """Driven again with the extended model the arm is where it should be in time."""
     pytest.importorskip('rclpy', reason='the nodes need ROS 2')
-    done = play(root, tmp_path / 'demo', domain_id, '--hidden', 'thermal_lag')
+    # Its holds of 6 s are short: at the usual 12 times real time a busy machine misses targets.
+    done = play(root, tmp_path / 'demo', domain_id, '--hidden', 'thermal_lag', '--speed', '6')
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / 'demo.json').read_text(encoding='utf-8'))
     assert result['hidden'] == 'thermal_lag' and done.stdout.count('Hidden was: thermal_lag') == 1
