@@ -140,6 +140,17 @@ def test_long_line_counts_once():
     assert decoder.bad_lines == 1 and decoder.last_bad is lines[0]
 
 
+def test_the_rest_of_a_line_that_began_before_anybody_listened_is_no_bad_line():
+    telemetry = encode('telemetry', 0, {'counts': 7})
+    decoder = Decoder()
+    decoder.begin()
+    assert [frame.sequence for frame in decoder.feed(telemetry[1:] + encode('ok', 1))] == [1]
+    assert decoder.bad_lines == 0
+    assert isinstance(decoder.feed(telemetry[1:])[0], BadLine) and decoder.bad_lines == 1
+    decoder.begin()
+    assert [frame.sequence for frame in decoder.feed(telemetry)] == [0]
+
+
 def test_longest_line_that_can_be_written_can_be_read():
     room = MAX_LINE - len(encode('x', 1, {'k': ''.ljust(1, 'v')})) + 1
     frame = Frame('x', 1, {'k': 'v' * room})

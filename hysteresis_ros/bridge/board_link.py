@@ -146,7 +146,7 @@ class BoardLink:
             reason = _HINTS.get(number or 0) or (os.strerror(number) if number else str(error))
             reason = reason.replace(f'Could not open port {self.port}: ', '')
             raise BoardError(f'port {self.port} cannot be opened: {reason}') from None
-        self.decoder.feed(b'\n')
+        self.decoder.begin()
         self._expected = None
 
     def close(self) -> None:

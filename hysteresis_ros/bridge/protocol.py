@@ -309,6 +309,16 @@ class Decoder:
         self.bad_lines = 0
         self.last_bad: BadLine | None = None
         self._line = bytearray()
+        self._cut = False       # the line under way may lack its beginning
+
+    def begin(self) -> None:
+        """
+        Begin anew on a stream that may be in the middle of a line.
+
+        The rest of a line that began before anybody listened is dropped, not counted as bad.
+        """
+        self._line.clear()
+        self._cut = True
 
     def feed(self, data: bytes) -> list[Line]:
         """
@@ -345,11 +355,14 @@ class Decoder:
         else:
             line = parse_line(bytes(self._line))
         self._line.clear()
+        cut, self._cut = self._cut, False
         if isinstance(line, Frame):
             self.frames += 1
         elif isinstance(line, Remark):
             self.remarks += 1
         elif line is not None:
-            self.bad_lines += 1
             self.last_bad = line
+            if cut:
+                return None
+            self.bad_lines += 1
         return line
