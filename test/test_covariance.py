@@ -7,20 +7,31 @@ import pytest
 from scipy import optimize, stats
 
 from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 
 ROWS, TRIALS = 120, 3
 
 
 def smooth(rows, size):
-    """Return a smooth covariance (rows, rows) of a size."""
-    place = np.linspace(0.0, 1.0, rows)
-    return size ** 2 * np.exp(-0.5 * ((place[:, None] - place[None, :]) / 0.45) ** 2)
+    """Return a smooth discrepancy of a size."""
+    return Discrepancy(np.full((rows, 1), size), np.linspace(0.0, 2.0, rows)[:, None])
 
 
-def make(size=0.01, resolution=1e-4, trials=TRIALS, dt=30.0):
+def make(size=0.01, resolution=1e-4, trials=TRIALS, dt=30.0, largest_noise=np.inf):
     """Return covariances on some trials of settled rows."""
     trial = np.repeat(np.arange(trials), ROWS // trials)
-    return Covariance(smooth(ROWS, size), dt * np.arange(1.0, ROWS + 1.0), trial, resolution, 0.3)
+    return Covariance(smooth(ROWS, size), dt * np.arange(1.0, ROWS + 1.0), trial, resolution,
+                      largest_noise, 0.3)
+
+
+def test_a_discrepancy_is_the_sum_of_its_parts_correlated_between_near_rows():
+    """By hand for three rows, of which two are at one place."""
+    parts = np.array([[3.0, 0.0], [4.0, 1.0], [0.0, 2.0]])
+    found = Discrepancy(parts, np.array([[0.0, 0.0], [0.0, 0.0], [3.0, 4.0]]))
+    far = 1.0 / np.sqrt(26.0)
+    np.testing.assert_allclose(found.matrix(), [
+        [9.0, 12.0, 0.0], [12.0, 17.0, 2.0 * far], [0.0, 2.0 * far, 4.0]], atol=1e-12)
+    assert found.size == pytest.approx(np.sqrt(30.0 / 3.0))
 
 
 def autoregressive(rng, rows, rho, size):
@@ -36,8 +47,10 @@ def test_the_gradient_of_the_marginal_likelihood_is_that_of_differences():
     covariance, rng = make(), np.random.default_rng(1)
     residual = autoregressive(rng, ROWS, 0.8, 0.02)
     values = np.array([0.2, np.log(0.015), np.log(100.0), np.log(0.003)])
-    found = covariance._cost(values, residual)[1]
-    expected = optimize.approx_fprime(values, lambda v: covariance._cost(v, residual)[0], 1e-6)
+    matrix = smooth(ROWS, 0.01).matrix()
+    found = covariance._cost(values, residual, matrix)[1]
+    expected = optimize.approx_fprime(
+        values, lambda v: covariance._cost(v, residual, matrix)[0], 1e-6)
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-3)
 
 
@@ -61,6 +74,14 @@ def test_white_noise_is_estimated_from_the_residuals(noise):
     assert found[1] < noise
 
 
+def test_what_all_rows_show_to_be_no_noise_is_not_taken_for_it():
+    """Rows of a ringing arm, thinned, look like white noise."""
+    residual = 0.03 * np.random.default_rng(3).standard_normal(ROWS)
+    found = np.exp(make(largest_noise=0.001).fit(residual))
+    assert found[3] <= 0.001 * (1.0 + 1e-9)
+    assert found[1] > 0.015
+
+
 @pytest.mark.parametrize('rho', [0.9, 0.98])
 def test_drift_is_estimated_with_its_time(rho):
     """Autocorrelated residuals say less than their number."""
@@ -82,8 +103,8 @@ def test_whitened_rows_are_independent():
 
 def test_the_largest_error_is_beyond_the_expected_one_and_grows_with_it():
     """One draw in twenty of the discrepancy exceeds it."""
-    rng = np.random.default_rng(6)
-    small, large = (make(size).largest_error(rng, 2000) for size in (0.01, 0.02))
+    small, large = (make(size).largest_error(np.random.default_rng(6), 2000)
+                    for size in (0.01, 0.02))
     assert 0.012 < small < 0.03
     assert large == pytest.approx(2.0 * small, rel=0.1)
 

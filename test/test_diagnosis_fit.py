@@ -9,6 +9,7 @@ import pytest
 
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of, usual
 from hysteresis_ros.effects import catalogue
@@ -22,8 +23,8 @@ def fitter_of(model, measured, jobs=1):
     """Return a fitter on a recording, under a smooth discrepancy and noise."""
     problem = problem_for(model, [measured], jobs=jobs)
     drive = problem.signals['drive'] / 6.0
-    discrepancy = SIZE ** 2 * np.exp(-0.5 * ((drive[:, None] - drive[None, :]) / 0.45) ** 2)
-    covariance = Covariance(discrepancy, problem.clock, problem.trial, NOISE, 0.3)
+    discrepancy = Discrepancy(np.full((len(drive), 1), SIZE), drive[:, None] / 0.45)
+    covariance = Covariance(discrepancy, problem.clock, problem.trial, NOISE, np.inf, 0.3)
     covariance.add(covariance.start(0.1, 0.3))
     return Fitter(problem, covariance, lambda fit: discrepancy)
 

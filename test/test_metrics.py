@@ -5,7 +5,7 @@
 from hypothesis import given, strategies
 from hypothesis.extra.numpy import arrays
 from hysteresis_ros.measurements.metrics import (
-    errors, noise_floor, repeat_noise, resolution_noise, sample_noise)
+    errors, largest_noise, noise_floor, repeat_noise, resolution_noise, sample_noise)
 from hysteresis_ros.measurements import Measurement
 import numpy as np
 import pytest
@@ -57,6 +57,18 @@ def test_samples_show_white_noise_on_a_slow_motion():
     assert noise_floor([run]).origin == 'samples'
     short = table(np.zeros(5), time=np.arange(5.0), voltage=np.arange(5.0), angle=np.arange(5.0))
     assert sample_noise(short) == 0.0
+
+
+@pytest.mark.parametrize('noise', [0.002, 0.1])
+def test_white_noise_cannot_be_larger_than_differences_of_rows(noise):
+    """A ringing at a twentieth of the sampling does not count, the noise on it does."""
+    rng = np.random.default_rng(1)
+    time = np.arange(4000) / 100
+    angle = 1.0 + 0.1 * np.sin(2.0 * np.pi * 5.0 * time) + noise * rng.standard_normal(4000)
+    run = table(np.zeros(4000), time=time, voltage=np.sin(time), angle=angle)
+    assert noise < largest_noise(run) < 1.3 * noise
+    short = table(np.zeros(5), time=np.arange(5.0), voltage=np.arange(5.0), angle=np.arange(5.0))
+    assert largest_noise(short) == np.inf
 
 
 def test_repeats_show_what_differs_between_equal_trials():

@@ -146,7 +146,7 @@ def test_noise_is_no_evidence_for_any_effect(model):
     found = selection(model, recording(model, noise=0.035))
     assert found.valid() == [frozenset()]
     assert found.ranked()[0] == frozenset()
-    assert found.base.point.noise == pytest.approx(0.035, rel=0.2)
+    assert found.base.noise == pytest.approx(0.035, rel=0.2)
 
 
 def test_something_that_happened_once_has_its_time(model):

@@ -15,13 +15,14 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from hysteresis_ros.diagnosis.covariance import Covariance, Point
+from hysteresis_ros.diagnosis.covariance import Covariance, noise_of, Point
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector
 from hysteresis_ros.effects import Effect
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 
 # Simulated responses are smooth only on this scale of the parameters' units.
 DIFFERENCE = 0.02
@@ -56,8 +57,9 @@ class Fit:
         Derivatives of `predicted`.
     log_evidence : float
         Laplace's approximation; see `Fitter.judge`.
-    point : Point or None
-        Covariance of the residuals under which the evidence is largest.
+    values : ndarray, shape (4,), or None
+        Of the covariance of the residuals under which the evidence is largest; see `Point`. None
+        before `Fitter.judge`, or where no covariance gives a finite evidence.
     spread : ndarray, shape (k, k)
         Posterior covariance of `vector`.
     held_out : ndarray, shape (n,)
@@ -75,7 +77,7 @@ class Fit:
     predicted: np.ndarray
     jacobian: np.ndarray
     log_evidence: float = -np.inf
-    point: Point | None = None
+    values: np.ndarray | None = None
     spread: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     held_out: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     covariance: Covariance | None = None
@@ -86,18 +88,23 @@ class Fit:
         """Identifiers of the effects, sorted."""
         return tuple(sorted(effect.id for effect in self.effects))
 
-    def require_point(self) -> Point:
+    def require_values(self) -> np.ndarray:
         """
-        Return the covariance of the residuals under which the evidence is largest.
+        Return the `values`.
 
         Raises
         ------
         ValueError
-            If the fit was not judged, or no covariance gives it a finite evidence.
+            If there are none.
         """
-        if self.point is None:
+        if self.values is None:
             raise ValueError('a fit has no covariance before it is judged')
-        return self.point
+        return self.values
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the white noise, in the unit of the response."""
+        return noise_of(self.require_values())
 
     def implausible(self) -> list[str]:
         """Names of parameters whose estimate is outside their physical range."""
@@ -157,11 +164,11 @@ class Fitter:
     covariance : Covariance
         Of the residuals.
     discrepancy : callable
-        ``discrepancy(fit)``: that of the base model along the way of a fit, shape (n, n).
+        ``discrepancy(fit)``: the `Discrepancy` of the base model along the way of a fit.
     """
 
     def __init__(self, problem: ArmProblem, covariance: Covariance,
-                 discrepancy: Callable[[Fit], np.ndarray]) -> None:
+                 discrepancy: Callable[[Fit], Discrepancy]) -> None:
         self.problem = problem
         self.covariance = covariance
         self.discrepancy = discrepancy
@@ -271,8 +278,8 @@ class Fitter:
         else:
             count = len(self.covariance.points)
             best = dataclasses.replace(fit, judged=count)
-            points = (fit.covariance.point(point.values)
-                      for point in self.covariance.points[fit.judged:])
+            points = fit.covariance.points_at(
+                point.values for point in self.covariance.points[fit.judged:])
         for point in points:
             residual = point.whiten(self.problem.measured - fit.predicted)
             jacobian = point.whiten(fit.jacobian) if len(fit.vector) else fit.jacobian
@@ -281,8 +288,12 @@ class Fitter:
                         - 0.5 * float(np.linalg.slogdet(matrix)[1]))
             if evidence > best.log_evidence:
                 best = dataclasses.replace(
-                    best, log_evidence=evidence, point=point, spread=np.linalg.inv(matrix))
+                    best, log_evidence=evidence, values=point.values, spread=np.linalg.inv(matrix))
         return best
+
+    def point(self, fit: Fit) -> Point:
+        """Return the covariance of the residuals under which a fit's evidence is largest."""
+        return (fit.covariance or self.covariance).point(fit.require_values())
 
     def along(self, fit: Fit) -> Fit:
         """Return a fit judged by the discrepancy along the way that the arm takes with it."""
@@ -293,7 +304,7 @@ class Fitter:
     def refined(self, fit: Fit) -> Fit:
         """Fit the covariance to the residual of a fit, then the effects under it once more."""
         own = fit.covariance or self.covariance
-        values = own.fit(self.problem.measured - fit.predicted, fit.require_point().values)
+        values = own.fit(self.problem.measured - fit.predicted, fit.require_values())
         self.covariance.add(values)
         point = own.point(values)
         better = self.fit([fit.effects], point, steps=3) if len(fit.vector) else []
@@ -313,7 +324,7 @@ class Fitter:
         found, = self.fit([fit.effects], white) or [fit]
         away = found.vector - fit.vector
         return dataclasses.replace(
-            found, log_evidence=fit.log_evidence, point=fit.point,
+            found, log_evidence=fit.log_evidence, values=fit.values,
             spread=fit.spread + np.outer(away, away) / FACTOR ** 2)
 
     def least_error(self, fit: Fit) -> float:

@@ -90,7 +90,7 @@ class _Verdict:
             verdict=kind, missing=missing,
             alternatives=[alternatives[name] for name in missing],
             ranking=self._ranking(missing, before), sets=self._sets(shares, unknown),
-            noise_floor=selection.fits[chosen].require_point().noise,
+            noise_floor=selection.fits[chosen].noise,
             structural_error=selection.covariance.size,
             unexplained=self._unexplained(chosen),
             experiment=verdict.next_experiment(

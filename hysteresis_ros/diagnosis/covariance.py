@@ -16,11 +16,16 @@ one, because the bench says how large the discrepancy is, a is of its size or le
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 import copy
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import linalg
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 
 # Bounds of the amplitudes against the discrepancy's size: as good as nothing, as good as all.
 WIDEST = 1e3
@@ -56,10 +61,10 @@ class Point:
         """Return columns (n,) or (n, k) in units in which the covariance is the identity."""
         return linalg.solve_triangular(self.factor, columns, lower=True, check_finite=False)
 
-    @property
-    def noise(self) -> float:
-        """Standard deviation of the white noise, in the unit of the response."""
-        return float(np.exp(self.values[3]))
+
+def noise_of(values: np.ndarray) -> float:
+    """Return the standard deviation of the white noise that a `Point`'s values (4,) say."""
+    return float(np.exp(values[3]))
 
 
 class Covariance:
@@ -68,14 +73,16 @@ class Covariance:
 
     Parameters
     ----------
-    discrepancy : ndarray, shape (n, n)
-        D, in the squared unit of the response.
+    discrepancy : Discrepancy
+        D.
     clock : ndarray, shape (n,)
         Time of each row [s].
     trial : ndarray of int, shape (n,)
         Trial of each row; rows of different trials share the discrepancy only.
     resolution : float
         Standard deviation that the sensor's steps cause; the noise is at least this.
+    largest_noise : float
+        Standard deviation that the noise can have at most.
     scale_spread : float
         Spread (natural logarithm) of s.
 
@@ -87,13 +94,13 @@ class Covariance:
         Covariances at hand; see `add`.
     """
 
-    def __init__(self, discrepancy: np.ndarray, clock: np.ndarray, trial: np.ndarray,
-                 resolution: float, scale_spread: float) -> None:
+    def __init__(self, discrepancy: Discrepancy, clock: np.ndarray, trial: np.ndarray,
+                 resolution: float, largest_noise: float, scale_spread: float) -> None:
         self._discrepancy = discrepancy
         self._same = trial[:, None] == trial[None, :]
         self._gaps = np.where(self._same, np.abs(clock[:, None] - clock[None, :]), 0.0)
         self._spread = scale_spread
-        self.size = float(np.sqrt(np.mean(np.diag(discrepancy))))
+        self.size = discrepancy.size
         span = max(float(np.max(self._gaps)), _TINY)
         steps = np.diff(clock)[np.diff(trial) == 0]
         shortest = max(float(np.median(steps)), 1e-9 * span) if len(steps) else span
@@ -103,12 +110,12 @@ class Covariance:
         self._low = np.array([-LARGEST_SCALE, np.log(self._scale / WIDEST),
                               np.log(2.0 * shortest), np.log(self.resolution)])
         self._high = np.array([LARGEST_SCALE, np.log(WIDEST * self._scale), np.log(3.0 * span),
-                               np.log(WIDEST * self._scale)])
+                               np.log(min(max(largest_noise, _TINY), WIDEST * self._scale))])
         self._high = np.maximum(self._high, self._low)
         self.points: list[Point] = []
 
-    def of(self, discrepancy: np.ndarray) -> Covariance:
-        """Return covariances with another discrepancy (n, n), and none at hand."""
+    def of(self, discrepancy: Discrepancy) -> Covariance:
+        """Return covariances with another discrepancy, and none at hand."""
         other = copy.copy(self)
         other._discrepancy, other.points = discrepancy, []
         return other
@@ -118,11 +125,12 @@ class Covariance:
         return np.clip([0.0, np.log(max(drift * self._scale, _TINY)), self._middle,
                         np.log(max(noise * self._scale, self.resolution))], self._low, self._high)
 
-    def _parts(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    def _parts(self, values: np.ndarray, discrepancy: np.ndarray
+               ) -> tuple[np.ndarray, np.ndarray, float]:
         """Return discrepancy and drift, each (n, n), and the variance of the noise."""
         drift = np.where(self._same, np.exp(-self._gaps / np.exp(values[2])), 0.0)
         drift *= np.exp(2.0 * values[1])
-        return np.exp(2.0 * values[0]) * self._discrepancy, drift, np.exp(2.0 * values[3])
+        return np.exp(2.0 * values[0]) * discrepancy, drift, np.exp(2.0 * values[3])
 
     def _prior(self, values: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the log density of values (4,), and its gradient."""
@@ -145,17 +153,23 @@ class Covariance:
         LinAlgError
             If it is not positive definite by rounding.
         """
-        discrepancy, drift, white = self._parts(values)
-        total = discrepancy + drift
-        total[np.diag_indices_from(total)] += white
-        factor = linalg.cholesky(total, lower=True, check_finite=False)
-        constant = (self._prior(values)[0] - float(np.sum(np.log(np.diag(factor))))
-                    - 0.5 * len(total) * np.log(2.0 * np.pi))
-        return Point(np.array(values), factor, constant)
+        return next(self.points_at([values]))
+
+    def points_at(self, several: Iterable[np.ndarray]) -> Iterator[Point]:
+        """Iterate over the covariances for several values (4,); see `point`."""
+        matrix = self._discrepancy.matrix()
+        for values in several:
+            discrepancy, drift, white = self._parts(values, matrix)
+            total = discrepancy + drift
+            total[np.diag_indices_from(total)] += white
+            factor = linalg.cholesky(total, lower=True, check_finite=False)
+            constant = (self._prior(values)[0] - float(np.sum(np.log(np.diag(factor))))
+                        - 0.5 * len(total) * np.log(2.0 * np.pi))
+            yield Point(np.array(values), factor, constant)
 
     def white(self, size: float) -> Point:
         """Return the covariance of white noise of a size alone: a fit is one by least squares."""
-        count = len(self._discrepancy)
+        count = len(self._gaps)
         values = np.array([self._low[0], self._low[1], self._middle, np.log(size)])
         return Point(values, size * np.eye(count), -np.inf)
 
@@ -182,7 +196,7 @@ class Covariance:
         float
             In the unit of the response.
         """
-        values, vectors = linalg.eigh(self._discrepancy)
+        values, vectors = linalg.eigh(self._discrepancy.matrix())
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         draws = root @ rng.standard_normal((len(values), count))
         scale = np.exp(self._spread * rng.standard_normal(count))
@@ -208,17 +222,19 @@ class Covariance:
         share = float(np.sqrt(np.mean(residual ** 2))) / self._scale
         starts = [self.start(0.1, share), self.start(share, 0.1)] if values is None else [
             np.clip(values, self._low, self._high)]
+        matrix = self._discrepancy.matrix()
         from scipy import optimize     # a third of a second that bench tables do not need
         with np.errstate(all='ignore'):
             found = [optimize.minimize(
-                self._cost, start, (residual,), jac=True, method='L-BFGS-B',
+                self._cost, start, (residual, matrix), jac=True, method='L-BFGS-B',
                 bounds=list(zip(self._low, self._high)), options={'maxfun': EVALUATIONS})
                 for start in starts]
         return min(found, key=lambda one: one.fun).x
 
-    def _cost(self, values: np.ndarray, residual: np.ndarray) -> tuple[float, np.ndarray]:
+    def _cost(self, values: np.ndarray, residual: np.ndarray, matrix: np.ndarray
+              ) -> tuple[float, np.ndarray]:
         """Return minus the log posterior density of values (4,), and its gradient."""
-        discrepancy, drift, white = self._parts(values)
+        discrepancy, drift, white = self._parts(values, matrix)
         total = discrepancy + drift
         total[np.diag_indices_from(total)] += white
         try:

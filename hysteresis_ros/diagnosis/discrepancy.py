@@ -15,6 +15,8 @@ its present load had acted all along. Their difference is the second part (`path
 from __future__ import annotations
 
 from collections.abc import Sequence
+import dataclasses
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +36,41 @@ if TYPE_CHECKING:
 DIRECTIONAL = 0.5
 # Constant loads between which the response is interpolated, and angles of the balance.
 LOADS, ANGLES = 12, 400
+
+
+@dataclasses.dataclass
+class Discrepancy:
+    """
+    The base model's own error, as the parts of its covariance.
+
+    Errors of one part are correlated between rows as these are near each other, by
+
+        1 / sqrt(1 + d^2),
+
+    the rational quadratic kernel with alpha = 1/2: a mixture of errors of every length from that of
+    the bench's grid on (Rasmussen and Williams, Gaussian Processes for Machine Learning, eq. 4.19).
+
+    Attributes
+    ----------
+    parts : ndarray, shape (n, p)
+        Standard deviations of independent errors in each row, in the unit of the response.
+    places : ndarray, shape (n, m)
+        Where each row lies, in units of the length over which errors change.
+    """
+
+    parts: np.ndarray
+    places: np.ndarray
+
+    @property
+    def size(self) -> float:
+        """Root mean square, in the unit of the response."""
+        return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1))))
+
+    def matrix(self) -> np.ndarray:
+        """Return the covariance, shape (n, n)."""
+        squares = np.sum(self.places ** 2, axis=1)
+        gaps = squares[:, None] + squares[None, :] - 2.0 * self.places @ self.places.T
+        return (self.parts @ self.parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0))
 
 
 class Offset(MaterialEffect):
@@ -72,10 +109,10 @@ def sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     return (up - down) / (2.0 * step)
 
 
-def covariance(problem: ArmProblem, effects: Sequence[Effect], predicted: np.ndarray,
-               settings: Settings) -> np.ndarray:
+def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted: np.ndarray,
+                      settings: Settings) -> Discrepancy:
     """
-    Return the covariance of the base model's own error of the angle.
+    Return the base model's own error of the angle, along the way that the arm takes.
 
     Parameters
     ----------
@@ -89,33 +126,16 @@ def covariance(problem: ArmProblem, effects: Sequence[Effect], predicted: np.nda
 
     Returns
     -------
-    ndarray, shape (n, n)
-        In the squared unit of the response.
+    Discrepancy
     """
     gain, path = sensitivity(problem, effects), path_difference(problem, effects)
-    near = _correlation(problem, predicted, settings.correlation)
     direction = np.ones(len(predicted))
     if 'direction' in problem.signals:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
-    bench = 1.0 + DIRECTIONAL ** 2 * np.outer(direction, direction)
-    bench *= np.outer(gain, gain) * (
-        length_error(problem.model) ** 2 / (1.0 + DIRECTIONAL ** 2))
-    return near * (bench + np.outer(path, path))
-
-
-def _correlation(problem: ArmProblem, predicted: np.ndarray, length: float) -> np.ndarray:
-    """
-    Return the correlation (n, n) of errors at neighbouring drives and responses.
-
-    1 / sqrt(1 + d^2 / length^2), the rational quadratic kernel with alpha = 1/2: a mixture of
-    errors of every length from that of the bench's grid on (Rasmussen and Williams, Gaussian
-    Processes for Machine Learning, eq. 4.19).
-    """
+    bench = gain * (length_error(problem.model) / math.sqrt(1.0 + DIRECTIONAL ** 2))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
-    places = np.column_stack([_unit(drive), _unit(predicted)]) / length
-    squares = np.sum(places ** 2, axis=1)
-    gaps = squares[:, None] + squares[None, :] - 2.0 * places @ places.T
-    return 1.0 / np.sqrt(1.0 + np.maximum(gaps, 0.0))
+    return Discrepancy(np.column_stack([bench, DIRECTIONAL * direction * bench, path]),
+                       np.column_stack([_unit(drive), _unit(predicted)]) / settings.correlation)
 
 
 def path_difference(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.effects import Effect
-from hysteresis_ros.measurements.metrics import resolution_noise
+from hysteresis_ros.measurements.metrics import largest_noise, resolution_noise
 from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.model.simulation import Simulator
 
@@ -46,6 +46,8 @@ class Problem:
         The response in the rows that are judged: an angle [rad], a length [m] or a strain.
     noise : float
         Standard deviation that the sensor's resolution causes, in the unit of the response.
+    largest_noise : float
+        Standard deviation that white noise can have at most, as all rows show it.
     clock : ndarray, shape (n,)
         Time of each row since the first recording began [s].
     trial, fold, block : ndarray of int, shape (n,)
@@ -72,6 +74,7 @@ class Problem:
         self.chosen = [np.arange(0, m.rows, self.stride) for m in measurements]
         self.measured = self.pick([m.column(m.response) for m in measurements])
         self.noise = max(resolution_noise(m) for m in measurements)
+        self.largest_noise = max(largest_noise(m) for m in measurements)
         self._divide()
         self.signals = self._signals()
 

@@ -12,7 +12,6 @@ full fits.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-import functools
 import math
 from typing import TYPE_CHECKING
 
@@ -20,7 +19,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance, Point
-from hysteresis_ros.diagnosis.discrepancy import covariance
+from hysteresis_ros.diagnosis.discrepancy import discrepancy_along
 from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_starts
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
@@ -28,6 +27,7 @@ from hysteresis_ros.effects import Effect
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.diagnosis.discrepancy import Discrepancy
     from hysteresis_ros.diagnosis.settings import Settings
     from hysteresis_ros.workers import Progress
 
@@ -77,10 +77,9 @@ class Selection:
         self.fixed = list(problem.model.effects)
         predicted = problem.simulate(self.fixed)
         self.covariance = Covariance(
-            covariance(problem, self.fixed, predicted, settings), problem.clock, problem.trial,
-            problem.noise, settings.scale_spread)
-        self.fitter = Fitter(problem, self.covariance,
-                             functools.partial(_discrepancy_along, problem, settings))
+            discrepancy_along(problem, self.fixed, predicted, settings), problem.clock,
+            problem.trial, problem.noise, problem.largest_noise, settings.scale_spread)
+        self.fitter = Fitter(problem, self.covariance, self._discrepancy)
         for drift, noise in FIRST_POINTS:
             self.covariance.add(self.covariance.start(drift, noise))
         self.covariance.add(self.covariance.fit(problem.measured - predicted))
@@ -96,6 +95,11 @@ class Selection:
         self.rmse_95 = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised
         self.p_values: dict[str, float] = {}
+
+    def _discrepancy(self, fit: Fit) -> Discrepancy:
+        """Return the discrepancy of the base model where the arm goes with a fit."""
+        effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
+        return discrepancy_along(self.problem, effects, fit.predicted, self.settings)
 
     def run(self) -> None:
         """Score all single effects and pairs, fit the best, and grow sets from them."""
@@ -135,7 +139,7 @@ class Selection:
                 fitted.append(Start(fit.effects[0], change, fit.jacobian * spread))
         family = Linearised(self.covariance.points, self.problem.measured - self.base.predicted,
                             [*self.alone.starts, *fitted])
-        return family.p_values(self.base.require_point(), self.rng, self.settings.draws)
+        return family.p_values(self.fitter.point(self.base), self.rng, self.settings.draws)
 
     def _worth_growing(self) -> bool:
         """Whether the best set's residual is too large, or one more effect explains some of it."""
@@ -203,7 +207,7 @@ class Selection:
             others = [name for name in self.names if name not in taken]
             _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
             self._linearised[names] = known = (fit.predicted, Linearised(
-                [fit.require_point()] if fit.covariance else self.covariance.points,
+                [self.fitter.point(fit)] if fit.covariance else self.covariance.points,
                 self.problem.measured - fit.predicted,
                 linearised_starts(self.fitter, fit, others), fit.jacobian * spread))
         return known[1]
@@ -300,8 +304,7 @@ class Selection:
 
     def noise_free_rmse(self, names: frozenset[str]) -> float:
         """Return the root mean square of a set's residual without white noise."""
-        noise = self.fits[names].require_point().noise
-        return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
+        return math.sqrt(max(self.error(names) ** 2 - self.fits[names].noise ** 2, 0.0))
 
     def sufficient(self, names: frozenset[str]) -> bool:
         """Whether a set's residual is no larger than the base model's own error could be."""
@@ -354,10 +357,3 @@ class Selection:
 def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
     """Return the sets that lack one of the effects named."""
     return [names - {name} for name in names]
-
-
-def _discrepancy_along(problem: ArmProblem, settings: Settings,
-                       fit: Fit) -> np.ndarray:
-    """Return the discrepancy (n, n) of the base model where the arm goes with a fit."""
-    effects = [*unaffected(problem.model.effects, fit.effects), *fit.effects]
-    return covariance(problem, effects, fit.predicted, settings)

@@ -3,6 +3,7 @@
 """How far a prediction is off (Eqs. 23 and 24), and how near it can come at all."""
 
 from collections.abc import Sequence
+import math
 from typing import NamedTuple
 
 from hysteresis_ros.measurements import Measurement, settled_rows
@@ -151,6 +152,35 @@ def sample_noise(measurement: Measurement) -> float:
     if seconds.size < 10:
         return 0.0
     return float(1.4826 * np.median(np.abs(seconds)) / np.sqrt(6.0))
+
+
+def largest_noise(measurement: Measurement) -> float:
+    """
+    Return the largest standard deviation that white noise of a recording can have.
+
+    White noise of variance s^2 makes differences of order p of variance C(2p, p) s^2, and a motion
+    can only add to it; of the orders up to four the one counts to which it adds least.
+
+    Parameters
+    ----------
+    measurement : Measurement
+
+    Returns
+    -------
+    float
+        With three standard errors; infinite for fewer than ten differences.
+
+    """
+    values = measurement.column(measurement.response)
+    trials = [values[rows] for _, rows in measurement.split()]
+    bounds = [np.inf]
+    for order in range(1, 5):
+        differences = np.concatenate([np.diff(one, order) for one in trials])
+        if differences.size >= 10:
+            size = np.sqrt(np.mean(differences ** 2) / math.comb(2 * order, order))
+            # Neighbouring differences are correlated: about one in `order` counts.
+            bounds.append(size * (1.0 + 3.0 / np.sqrt(2.0 * differences.size / order)))
+    return float(min(bounds))
 
 
 def repeat_noise(measurements: Sequence[Measurement]) -> float | None:
