@@ -36,6 +36,7 @@ def run_module(root, *arguments):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.linter
 def test_flake8(root):
     """Single quotes, 100 columns, and nothing that flake8 or its plug-ins complain of."""
     paths = [str(path.relative_to(root)) for path in python_files(root)]
@@ -45,6 +46,7 @@ def test_flake8(root):
         run_module(root, 'flake8', *paths)
 
 
+@pytest.mark.linter
 def test_docstrings(root):
     """Everything public is documented, after numpy's conventions."""
     paths = [str(path.relative_to(root)) for path in python_files(root)]
@@ -55,6 +57,7 @@ def test_docstrings(root):
         run_module(root, 'pydocstyle', '--convention=numpy', '--add-ignore=D105', *paths)
 
 
+@pytest.mark.linter
 @pytest.mark.skipif(find_spec('mypy') is None, reason='mypy is not installed (extra `test`)')
 def test_types(root, request):
     """Type hints are complete and true in every folder that setup.cfg does not except."""
