@@ -55,6 +55,10 @@ class Chain:
         self.electrical = [effect for effect in drive if effect.stage == 'electrical']
         self.thermal = [effect for effect in drive if effect.stage == 'thermal']
         self.material = [e for e in ordered if isinstance(e, MaterialEffect)]
+        # Those to whose elongation time or history add.
+        self.drifting = [effect for effect in self.material
+                         if type(effect).drift is not MaterialEffect.drift
+                         or type(effect).advance is not MaterialEffect.advance]
         self.mechanism = [e for e in ordered if isinstance(e, MechanismEffect)]
         self.sensor = [e for e in ordered if isinstance(e, SensorEffect)]
         self.needs_phase = any(effect.needs_phase for effect in ordered)
@@ -76,9 +80,7 @@ class Chain:
     @property
     def drifts(self) -> bool:
         """Whether time or history add to the elongation."""
-        return any(type(effect).drift is not MaterialEffect.drift
-                   or type(effect).advance is not MaterialEffect.advance
-                   for effect in self.material)
+        return bool(self.drifting)
 
     def to_drive_squared(self, drive: Values) -> Values:
         """Return the drive squared, sign kept; the drive where it is no voltage or current."""
@@ -182,7 +184,7 @@ class Chain:
               ) -> tuple[np.ndarray, np.ndarray]:
         """Return offset and factor of each row, each shape (rows,)."""
         offset, factor = np.zeros(len(drive)), np.ones(len(drive))
-        for effect in self.material:
+        for effect in self.drifting:
             added, times = effect.drift(drive, drive_squared, inputs, self.surroundings)
             offset, factor = offset + added, factor * times
         return offset, factor
@@ -190,7 +192,7 @@ class Chain:
     def advance(self, drive: float, drive_squared: float, inputs: Inputs) -> tuple[float, float]:
         """Return offset and factor of the next row, for a model that runs along."""
         offset, factor = 0.0, 1.0
-        for effect in self.material:
+        for effect in self.drifting:
             added, times = effect.advance(drive, drive_squared, inputs, self.surroundings)
             offset, factor = offset + added, factor * times
         return offset, factor

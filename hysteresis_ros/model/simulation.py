@@ -126,6 +126,8 @@ class Simulator:
         self.trials = trials_of(model, measurement)
         self._surroundings = model.surroundings
         self._balances: dict[tuple, ArmBalance] = {}
+        # The martensite share of every row in the latest run of a set of effects, by their names.
+        self._phases: dict[tuple[str, ...], np.ndarray] = {}
         self._statics = None
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
@@ -151,19 +153,35 @@ class Simulator:
         ParameterError, ModelFileError
             If the model lacks what this kind of measurement needs.
         """
+        response, phase = self._run(effects, inputs_of_stage)
+        self._keep(effects, phase)
+        return response
+
+    def _keep(self, effects: Sequence[Effect], phase: np.ndarray | None) -> None:
+        if phase is not None and np.all(np.isfinite(phase)):
+            self._phases[tuple(effect.id for effect in effects)] = phase
+
+    def _run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None
+             ) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return the response, and the martensite share where effects need it, each (rows,)."""
         chain = Chain(effects, self._surroundings)
         respond = self._responder(chain)
         result = np.empty(self.measurement.rows)
+        phase = None
+        if chain.needs_phase:
+            known = self._phases.get(tuple(effect.id for effect in effects))
+            phase = np.ones(self.measurement.rows) if known is None else known.copy()
         for trial in self.trials:
-            if chain.needs_phase:
-                response = self._agree(
-                    respond, trial, MOVING_PASSES if chain.moves else PHASE_PASSES)
+            if phase is not None:
+                response, phase[trial.rows] = self._agree(
+                    respond, trial, MOVING_PASSES if chain.moves else PHASE_PASSES,
+                    phase[trial.rows])
             else:
                 response = respond(trial, trial.inputs)
             result[trial.rows] = chain.measured(response.values, trial.inputs, response.rest)
             if inputs_of_stage is not None and response.inputs is not None:
                 inputs_of_stage.append(response.inputs)
-        return result
+        return result, phase
 
     def run_many(self, sets: Sequence[Sequence[Effect]], jobs: int = 1) -> np.ndarray:
         """
@@ -188,25 +206,34 @@ class Simulator:
         """
         if jobs > 1 and len(sets) > 1:
             with ThreadPoolExecutor(min(jobs, len(sets))) as pool:
-                rows = list(pool.map(self.run, sets))
+                found = list(pool.map(self._run, sets))
         else:
-            rows = [self.run(effects) for effects in sets]
-        return np.array(rows).reshape(len(sets), self.measurement.rows)
+            found = [self._run(effects) for effects in sets]
+        # Not before all have run, or the result would depend on who comes first.
+        for effects, (_, phase) in zip(sets, found):
+            self._keep(effects, phase)
+        return np.array([row for row, _ in found]).reshape(len(sets), self.measurement.rows)
 
-    def _agree(self, respond: Callable, trial: Trial, passes: int) -> Response:
-        """Return the response with the phase that it has itself, by Aitken's relaxation."""
-        phase, residual, part = np.ones(len(trial.drive)), None, 1.0
+    def _agree(self, respond: Callable, trial: Trial, passes: int, phase: np.ndarray
+               ) -> tuple[Response, np.ndarray]:
+        """
+        Return the response with the phase that it has itself, and this phase (rows,).
+
+        By Aitken's relaxation from the phase given; never by one pass alone, whose response would
+        be that of the phase given.
+        """
+        residual, part = None, 1.0
         for _ in range(passes):
             response = respond(trial, trial.inputs._replace(phase=phase))
             before, residual = residual, self._phase(response.output) - phase
-            if np.sqrt(np.mean(residual ** 2)) < AGREEMENT:
-                break
             if before is not None:
+                if np.sqrt(np.mean(residual ** 2)) < AGREEMENT:
+                    break
                 change = residual - before
                 part *= -float(before @ change) / max(float(change @ change), 1e-300)
                 part = min(max(part, SHORTEST), 1.0)
             phase = phase + part * residual
-        return response
+        return response, phase
 
     def _phase(self, given: np.ndarray) -> np.ndarray:
         """Martensite share as the operator's output shows it."""
