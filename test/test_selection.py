@@ -66,6 +66,18 @@ def test_a_larger_set_is_no_answer_where_a_smaller_one_suffices(payload):
     assert not set(larger) & set(payload.valid())
 
 
+def test_a_smaller_set_that_is_implausible_would_not_do(payload, monkeypatch):
+    """It can be no answer itself, so that a larger one with it may be."""
+    payload.grow(frozenset(['payload_error']))
+    small = frozenset(['payload_error'])
+    larger = next(names for names in payload.fits if small < names)
+    assert payload._would_do(small, larger)
+    fit = payload.fits[small]
+    too_heavy = fit.effects[0].with_values(dm=400.0)
+    monkeypatch.setitem(payload.fits, small, dataclasses.replace(fit, effects=[too_heavy]))
+    assert payload.fits[small].implausible() and not payload._would_do(small, larger)
+
+
 def two_effects(model):
     """Return a recording of an arm that carries 25 g more, of a supply that sags."""
     return recording(model, [effect_of(model, 'payload_error', dm=25.0),
@@ -88,6 +100,19 @@ def test_two_effects_behind_one_are_found_as_a_pair(model):
     """A heavier payload may leave no more than the bench's error, but not with that shape."""
     found = diagnose(model, [two_effects(model)], TRIED)
     assert (found.verdict, set(found.missing)) == ('missing', {'payload_error', 'supply_sag'})
+
+
+def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
+    """A fan is a sag to an arm at rest; with the values beside it the sag itself is found."""
+    model = bicep_model(metrics={'length': {'verification': {'rmse': 0.0001}}})
+    planted = frozenset(['payload_error', 'supply_sag'])
+    found = selection(model, recording(model, [
+        effect_of(model, 'payload_error', dm=-15.0), effect_of(model, 'supply_sag', Rs=0.8)]),
+        [*TRIED, 'airflow'])
+    before = found.fits.pop(planted).log_evidence
+    assert found.valid()[0] == {'airflow', 'payload_error'}
+    found._exchange()
+    assert found.fits[planted].log_evidence == pytest.approx(before, abs=1.0)
 
 
 def test_an_effect_has_to_matter_by_a_practical_size(model):

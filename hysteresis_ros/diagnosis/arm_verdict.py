@@ -170,8 +170,6 @@ class _Verdict:
         found: dict[str, list[str]] = {name: [] for name in chosen}
         if not chosen:
             return found
-        for name in chosen:
-            selection.grow(chosen - {name})
         best = selection.log_posterior(chosen)
         least = best + math.log(self.settings.reported)
         for names in selection.valid():

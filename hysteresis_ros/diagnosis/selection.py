@@ -12,6 +12,7 @@ full fits.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+import dataclasses
 import math
 from typing import TYPE_CHECKING
 
@@ -88,6 +89,7 @@ class Selection:
         self.fits: dict[frozenset[str], Fit] = {frozenset(): self.base}
         self._grown: set[frozenset[str]] = set()
         self._refined: set[frozenset[str]] = set()
+        self._exchanged: set[frozenset[str]] = set()
         self._least_errors: dict[frozenset[str], float] = {}
         # Both with the response that they belong to.
         self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
@@ -128,6 +130,7 @@ class Selection:
                 self.grow(names)
             self._refine(size + 1)
         self._refine_best()
+        self._exchange()
 
     def _significance(self) -> dict[str, float]:
         """Return family-wise p values of single effects, linearised at starts and at fits too."""
@@ -203,14 +206,18 @@ class Selection:
         fit = self.fits[names]
         known = self._linearised.get(names)
         if known is None or known[0] is not fit.predicted:
-            taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
-            others = [name for name in self.names if name not in taken]
-            _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
-            self._linearised[names] = known = (fit.predicted, Linearised(
-                [self.fitter.point(fit)] if fit.covariance else self.covariance.points,
-                self.problem.measured - fit.predicted,
-                linearised_starts(self.fitter, fit, others), fit.jacobian * spread))
+            self._linearised[names] = known = (fit.predicted, self._linearised_at(fit))
         return known[1]
+
+    def _linearised_at(self, fit: Fit) -> Linearised:
+        """Return all other effects, linearised at the values of a fit."""
+        taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
+        others = [name for name in self.names if name not in taken]
+        _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
+        return Linearised(
+            [self.fitter.point(fit)] if fit.covariance else self.covariance.points,
+            self.problem.measured - fit.predicted,
+            linearised_starts(self.fitter, fit, others), fit.jacobian * spread)
 
     def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
         """Fit the best sets for a few steps, and the best of these to the end."""
@@ -220,6 +227,32 @@ class Selection:
             self._metric(), FIRST_STEPS)
         begun.sort(key=lambda fit: -fit.log_evidence)
         self._fit([fit.effects for fit in begun[:self.settings.refits]])
+
+    def _exchange(self) -> None:
+        """
+        Exchange single effects of the answer for others, until no other set is more probable.
+
+        What the others begin with are the values beside the effect that they replace. Where a set
+        is grown from a smaller one, they are those of the smaller set, which may be far away.
+        """
+        for _ in range(self.settings.most_effects):
+            names = next(iter(self.valid()), frozenset())
+            if len(names) < 2 or names in self._exchanged or not self.sufficient(names):
+                return
+            self._exchanged.add(names)
+            whole = self.fits[names]
+            for out in sorted(names):
+                kept = [effect for effect in whole.effects if effect.id != out]
+                for rest in self.fitter.fit([kept], self._metric(), 0):
+                    scored = self._linearised_at(dataclasses.replace(
+                        rest, covariance=whole.covariance, values=whole.values)).singles()
+                    scored.pop((out,), None)
+                    order = sorted(scored.values(), key=lambda item: -item[0])
+                    self._fit([
+                        [*(one for one in kept if one.id not in effects[0].replaces), *effects]
+                        for _, effects in order[:self.settings.refits]])
+            self._refine(len(names))
+            self._refine_best()
 
     def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
@@ -349,9 +382,10 @@ class Selection:
                                    if 0 < len(other) <= len(names))
 
     def _would_do(self, without: frozenset[str], names: frozenset[str]) -> bool:
-        """Whether a smaller set suffices and is not clearly less probable than the larger one."""
+        """Whether a smaller set may be the answer, and is not clearly less probable."""
         odds = self.log_posterior(names) - self.log_posterior(without)
-        return self.sufficient(without) and odds < -math.log(self.settings.reported)
+        return (self.sufficient(without) and not self.fits[without].implausible()
+                and odds < -math.log(self.settings.reported))
 
 
 def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
