@@ -9,11 +9,19 @@ import select
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable', 'chrome')
 MISSING = 'no Chromium; apt-get install chromium, or name one in CHROME'
-LINES = 10 << 20
+MOST_BYTES = 10 << 20
+# DevTools read from descriptor 3 and write to 4, which may be taken when a test starts.
+START = '''
+import fcntl, os, sys
+for number, pipe in enumerate([fcntl.fcntl(int(n), fcntl.F_DUPFD, 10) for n in sys.argv[1:3]], 3):
+    os.dup2(pipe, number)
+os.execv(sys.argv[3], sys.argv[3:])
+'''
 
 
 def find_browser():
@@ -35,9 +43,8 @@ class Browser:
     def __init__(self, folder):
         ours_in, theirs_out = os.pipe()
         theirs_in, ours_out = os.pipe()
-        # DevTools read from descriptor 3 and write to 4.
         self.process = subprocess.Popen(
-            ['sh', '-c', f'exec "$0" "$@" 3<&{theirs_in} 4>&{theirs_out}', find_browser(),
+            [sys.executable, '-IS', '-c', START, str(theirs_in), str(theirs_out), find_browser(),
              '--headless=new', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage',
              '--no-first-run', '--disable-extensions', '--disable-background-networking',
              '--disable-component-update', '--hide-scrollbars', f'--user-data-dir={folder}',
@@ -73,7 +80,7 @@ class Browser:
         deadline = time.monotonic() + seconds
         while b'\0' not in self.buffer:
             ready = select.select([self.reader], [], [], max(deadline - time.monotonic(), 0))[0]
-            read = os.read(self.reader, LINES) if ready else b''
+            read = os.read(self.reader, MOST_BYTES) if ready else b''
             assert read, f'Chromium says nothing (exit status {self.process.poll()})'
             self.buffer += read
         message, _, self.buffer = self.buffer.partition(b'\0')

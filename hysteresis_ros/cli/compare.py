@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, origin, read_all, say, Steps, Subparsers,
-    warn, warn_of_loads, write_json)
+    add_data, add_json, add_model, add_report, add_settled, origin, read_all, say, Steps,
+    Subparsers, warn, warn_of_loads, write_json)
 from hysteresis_ros.cli.outputs import OutputFolder
 
 if TYPE_CHECKING:

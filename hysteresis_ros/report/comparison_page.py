@@ -98,7 +98,7 @@ def errors(comparison: Comparison) -> list[str]:
     strong = [n for n, row in enumerate(rows) if row[0] == comparison.name]
     steps = comparison.extensions or [(comparison.name, comparison.model)]
     bars = [page.Bar(linked(short_name(name)), scale * values.rmse,
-                     strong=bool(comparison.extensions) and values is steps[-1][1]) for name, values in steps]
+                     strong=len(steps) > 1 and values is steps[-1][1]) for name, values in steps]
     if comparison.linear is not None:
         bars.insert(0, page.Bar('linear model', scale * comparison.linear.rmse, hollow=True))
     bars.append(page.Bar('noise floor', scale * comparison.floor.value, hollow=True))

@@ -78,7 +78,8 @@ def _overlay(comparison: Comparison, after: Comparison | None) -> str:
 def _loop(comparison: Comparison) -> str:
     unit, scale = shown(comparison.quantity)
     residual = scale * comparison.residual
-    text = f'Loop of {label(comparison.drive)[0]} and {comparison.quantity}, coloured by the residual'
+    text = (f'Loop of {label(comparison.drive)[0]} and {comparison.quantity}, coloured by the '
+            'residual')
     drive = comparison.signals.get(comparison.drive)
     if drive is None:
         return text + '.'

@@ -158,12 +158,15 @@ def signals(comparison: Comparison) -> dict[str, Any]:
 def trials(comparison: Comparison, rows: np.ndarray) -> list[dict[str, Any]]:
     """Return name, error, and the first and the last but one of the drawn rows of each trial."""
     unit, scale = shown(comparison.quantity)
-    several = len(set(comparison.sources)) > 1
+    sources = {entry['source'] for entry in comparison.by_trial}
+    files = {source: os.path.basename(os.path.normpath(source)) for source in sources}
+    if len(set(files.values())) < len(files):
+        files = {source: source for source in sources}
     found = []
     for index, entry in enumerate(comparison.by_trial):
         name = f'{entry["trial"]:g}'
-        if several:
-            name += f' of {os.path.basename(os.path.normpath(entry["source"]))}'
+        if len(files) > 1:
+            name += f' of {files[entry["source"]]}'
         place = np.searchsorted(comparison.trial[rows], [index, index + 1])
         found.append({'name': name, 'from': int(place[0]), 'to': int(place[1]),
                       'error': f'{number(scale * entry["model"].rmse)} {unit} RMS'})

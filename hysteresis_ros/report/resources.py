@@ -3,8 +3,8 @@
 """
 The style and the script of a page, from the files in `web/`.
 
-The script is our own and not a plotting library: the charts need lines, dots and a pointer, in 30 kB
-that a reader of the page can read. A library would be ten to a hundred times as large and would
+The script is our own and not a plotting library: the charts need lines, dots and a pointer, in
+33 kB that a reader can read. The libraries are two to a hundred times as large, and the small ones
 draw into a canvas, which neither follows dark mode nor prints as lines.
 """
 
@@ -14,7 +14,8 @@ import hashlib
 from importlib.resources import files
 
 # In the order in which they need each other.
-SCRIPTS = ('elements', 'columns', 'scale', 'view', 'chart', 'lines', 'loop', 'means', 'controls', 'start')
+SCRIPTS = ('elements', 'columns', 'scale', 'view', 'chart', 'lines', 'loop', 'means', 'controls',
+           'start')
 
 
 @functools.cache
@@ -37,4 +38,4 @@ def script_digest() -> str:
 
 
 def _read(name: str) -> str:
-    return files('hysteresis_ros.report').joinpath('web', name).read_text(encoding='utf-8')
+    return (files('hysteresis_ros.report') / 'web' / name).read_text(encoding='utf-8')

@@ -1,14 +1,13 @@
 /* Copyright 2026 hysteresis_ros contributors */
 /* SPDX-License-Identifier: Apache-2.0 */
 
-/** Return a number with three digits and no exponent where that can be avoided. */
-function number(value) {
+/** Return a number with some digits and no exponent where that can be avoided. */
+function number(value, count = 3) {
   if (value === null || !Number.isFinite(value)) return '-';
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-4 || size >= 1e7)) return value.toExponential(2);
-  if (size >= 100) return value.toFixed(0);
-  const short = Number(value.toPrecision(3));
-  const digits = size === 0 ? 0 : Math.max(0, 2 - Math.floor(Math.log10(Math.abs(short))));
+  const short = Number(value.toPrecision(count));
+  const digits = short === 0 ? 0 : Math.max(0, count - 1 - Math.floor(Math.log10(Math.abs(short))));
   return short.toFixed(digits);
 }
 

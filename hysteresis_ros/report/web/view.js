@@ -94,14 +94,14 @@ class View {
     const trial = trials.find((one) => row < one.to);
     const unit = response.unit ? ` ${response.unit}` : '';
     const lines = [[x.label.replace(/ \[.*/, ''),
-      number(x.values[row]) + (x.unit ? ` ${x.unit}` : ''), `trial ${trial.name}`]];
+      number(x.values[row], 4) + (x.unit ? ` ${x.unit}` : ''), `trial ${trial.name}`]];
     lines.push([drive.label.replace(/ \[.*/, ''),
       number(drive.values[row]) + (drive.unit ? ` ${drive.unit}` : ''), '']);
-    lines.push(['measured', number(measured[row]) + unit, '']);
+    lines.push(['measured', number(measured[row], 4) + unit, '']);
     predictions.forEach((one, n) => {
       if (!this.shown[n] || one.values[row] === null) return;
       const residual = measured[row] - one.values[row];
-      lines.push([one.name, number(one.values[row]) + unit, `residual ${signed(residual)}${unit}`]);
+      lines.push([one.name, number(one.values[row], 4) + unit, `residual ${signed(residual)}${unit}`]);
     });
     return lines;
   }
