@@ -90,7 +90,7 @@ def test_many_trials_are_listed_worst_first():
     found = compare(FakeModel(), [stepped(trials=3)])
     html = comparison_page(found, {}, 'm.yaml')
     assert 'The 2 worst of 3 trials.' in ''.join(trials(found, most=2))
-    assert len(re.findall('<td[^>]*>memory</td>', html)) == 3
+    assert len(re.findall('<td data-label="file">memory</td>', html)) == 3
     assert len(figures(found)['overlay'].axes[0].lines) == 5
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from test_report import diagnosis, row, run_of
 
+from hysteresis_ros.comparison.compare import compare
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.report import charts, diagnosis_page
 
@@ -24,8 +25,8 @@ LONG = 'a_recording_with_a_name_that_is_much_longer_than_a_phone_is_wide_' * 2 +
 
 @pytest.fixture(scope='module')
 def recordings():
-    """Return two settled recordings of an arm with a payload of 15 g too much."""
-    arm = bicep_model(['payload_error'])
+    """Return two settled recordings of an arm with a payload too heavy, and an end stop."""
+    arm = bicep_model(['payload_error', 'end_stop'])
     return [Measurement.from_columns(run_of(arm, seed).columns, source=f'{seed}_{LONG}')
             for seed in (1, 2)]
 
@@ -157,11 +158,17 @@ def test_response_and_residual_share_their_axis(tab):
     assert len(circles) == 7 and set(circles) == {line[0]}
 
 
-def test_the_loop_has_the_colour_of_its_residual(tab):
-    classes = tab.run("[...document.querySelectorAll('path[class*=colour]')].map("
-                      "(one) => +/colour([0-9])/.exec(one.className.baseVal)[1])")
-    # A payload that is too heavy extends the elbow: all of one sign, more here than there.
-    assert len(classes) > 1 and (min(classes) >= 4 or max(classes) <= 4)
+def test_rows_on_the_loop_have_the_colour_of_their_residual(tab, recordings):
+    found = dict(tab.run(
+        "[...document.querySelectorAll('path[class*=colour]')].map((one) => "
+        "[+/colour([0-9])/.exec(one.className.baseVal)[1], one.getAttribute('d').split('M').length"
+        ' - 1])'))
+    residual = compare(bicep_model(), recordings).residual
+    shares = np.clip(residual / np.quantile(np.abs(residual), 0.99), -1.0, 1.0)
+    expected = np.bincount(np.floor(4.0 * (shares + 1.0) + 0.5).astype(int), minlength=9)
+    assert np.sum(expected > 0) > 4
+    off = [abs(found.get(colour, 0) - rows) for colour, rows in enumerate(expected)]
+    assert sum(off) <= 4 and sum(found.values()) == len(residual)
 
 
 def test_the_keyboard_reads_row_after_row(tab):
