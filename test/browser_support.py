@@ -16,12 +16,12 @@ NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable'
 MISSING = 'no Chromium; apt-get install chromium, or name one in CHROME'
 MOST_BYTES = 10 << 20
 # DevTools read from descriptor 3 and write to 4, which may be taken when a test starts.
-START = '''
+START = """
 import fcntl, os, sys
 for number, pipe in enumerate([fcntl.fcntl(int(n), fcntl.F_DUPFD, 10) for n in sys.argv[1:3]], 3):
     os.dup2(pipe, number)
 os.execv(sys.argv[3], sys.argv[3:])
-'''
+"""
 
 
 def find_browser():

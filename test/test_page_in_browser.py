@@ -10,16 +10,18 @@ from browser_support import Browser, find_browser, MISSING
 from model_support import bicep_model, effect_of
 import numpy as np
 import pytest
+from test_compare import FakeModel
 from test_report import diagnosis, row, run_of
 
 from hysteresis_ros.comparison.compare import compare
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.report import charts, diagnosis_page
+from hysteresis_ros.report.comparison_page import comparison_page
 
 pytestmark = pytest.mark.skipif(find_browser() is None, reason=MISSING)
 
-PIXEL = base64.b64decode('iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQ'
-                         'AAAABJRU5ErkJggg==')
+PIXEL = base64.b64decode('iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK'
+                         '+kcQAAAABJRU5ErkJggg==')
 LONG = 'a_recording_with_a_name_that_is_much_longer_than_a_phone_is_wide_' * 2 + '.csv'
 
 
@@ -181,14 +183,14 @@ def test_the_keyboard_reads_row_after_row(tab):
     assert all(re.search(r'measured [\d.]+ deg', one) for one in heard) and heard[0] != heard[1]
     assert text(tab, 'output') == heard[1]
     assert tab.run("[...document.querySelectorAll('button, select, input')].every((one) => "
-                   "one.ariaLabel || one.labels?.length || one.textContent)")
+                   'one.ariaLabel || one.labels?.length || one.textContent)')
 
 
 def test_a_command_is_copied(tab):
     tab.call('Browser.grantPermissions', permissions=['clipboardReadWrite',
                                                       'clipboardSanitizedWrite'])
     tab.run("document.querySelector('.command button').click()")
-    assert tab.run("new Promise((done) => setTimeout(() => done("
+    assert tab.run('new Promise((done) => setTimeout(() => done('
                    "document.querySelector('.command button').textContent), 100))") == 'Copied'
     copied = tab.run('navigator.clipboard.readText()')
     assert copied.startswith('hysteresis diagnose --model model.yaml --data 1_a_recording')
@@ -202,11 +204,11 @@ def test_a_phone_shows_the_page_without_moving_it_sideways(tab, path, dark):
     assert tab.run('document.scrollingElement.scrollWidth') == 400
     wide = tab.run("[...document.querySelectorAll('main *')].filter((one) => "
                    "one.getBoundingClientRect().right > 401 && !one.closest('svg, thead'))"
-                   ".map((one) => one.outerHTML.slice(0, 80))")
+                   '.map((one) => one.outerHTML.slice(0, 80))')
     assert wide == []
     # The number stands before, which here is above, its bar.
     tops = tab.run("['.value', '.bar'].map((name) => document.querySelector(`.bars ${name}`)"
-                   ".getBoundingClientRect().top)")
+                   '.getBoundingClientRect().top)')
     assert tops[0] < tops[1]
     lightness = sum(map(int, re.findall(r'\d+', tab.run(
         'getComputedStyle(document.body).backgroundColor'))[:3])) / 765
@@ -218,13 +220,39 @@ def test_paper_has_no_buttons_and_nothing_folded(tab):
     tab.run("dispatchEvent(new Event('beforeprint'))")
     assert tab.run("[...document.querySelectorAll('details')].every((one) => one.open)")
     assert tab.run("[...document.querySelectorAll('button, select, input')].every("
-                   "(one) => !one.checkVisibility())")
-    assert tab.run("getComputedStyle(document.body).color") == 'rgb(26, 31, 38)'
+                   '(one) => !one.checkVisibility())')
+    assert tab.run('getComputedStyle(document.body).color') == 'rgb(26, 31, 38)'
     assert tab.run("document.querySelector('.plot svg').checkVisibility()")
+
+
+def test_without_the_script_the_pictures_stay(browser, path):
+    browser.call('Emulation.setScriptExecutionDisabled', value=True)
+    try:
+        browser.media()
+        browser.open(path, 400)
+        assert count(browser, 'figure img') == 3 and count(browser, '.controls') == 0
+        assert browser.run('document.scrollingElement.scrollWidth') == 400
+    finally:
+        browser.call('Emulation.setScriptExecutionDisabled', value=False)
+
+
+@pytest.mark.parametrize('columns', [
+    {'time': [0.0], 'voltage': [1.0], 'angle': [1.8]},
+    {'time': [0.0, 1.0, 2.0], 'voltage': [0.0, 0.0, 0.0], 'angle': [2.0, 2.0, 2.0]}])
+def test_a_recording_in_which_nothing_happens_is_drawn(browser, tmp_path, columns):
+    found = compare(FakeModel(linear=None), [Measurement.from_columns(columns)])
+    page = tmp_path / 'page.html'
+    page.write_text(comparison_page(found, dict.fromkeys(['overlay', 'loop', 'signals'], PIXEL),
+                                    'model.yaml'), encoding='utf-8')
+    browser.open(page, 1200)
+    browser.mouse('mouseMoved', *place(browser, '.plot svg', 0.5, 0.3))
+    assert 'measured' in text(browser, '.plot .tip')
+    assert 'NaN' not in browser.run("document.querySelector('.explore').innerHTML")
+    assert browser.complaints() == []
 
 
 def test_no_other_script_runs(browser, path):
     browser.open(path, 1200)
     assert browser.run("(() => {const one = document.createElement('script');"
                        "one.textContent = 'window.ran = 1'; document.body.append(one);"
-                       "return window.ran === undefined})()")
+                       'return window.ran === undefined})()')

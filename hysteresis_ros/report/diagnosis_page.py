@@ -81,7 +81,7 @@ def write_diagnosis(path: AnyPath, model: MuscleModel, measurements: Sequence[Me
     parts.append(page.section('What the error is made of', page.table(
         ['part', f'RMSE [{unit}]'],
         [['without the effects, rows not fitted', number(scale * found.rmse_before)],
-         ['with them', number(scale * found.rmse_after)],
+         *([['with them', number(scale * found.rmse_after)]] if found.missing else []),
          ['error of the base model by itself (from the bench)',
           number(scale * found.structural_error)],
          ['noise floor of the sensor', number(scale * found.noise_floor)]])))

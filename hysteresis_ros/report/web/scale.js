@@ -23,7 +23,7 @@ function ticks(low, high, count) {
   const step = power * [1, 2, 5, 10].find((factor) => factor * power >= 0.7 * rough);
   const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const found = [];
-  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n += 1) {
+  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step && found.length < 50; n += 1) {
     const value = n * step;
     found.push({value, text: (Math.abs(value) < step / 2 ? 0 : value).toFixed(Math.min(digits, 12))});
   }
