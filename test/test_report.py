@@ -4,6 +4,7 @@
 
 from html import unescape
 from html.parser import HTMLParser
+import json
 import re
 
 from model_support import arm_run, bicep_model, effect_of, wandering_voltage
@@ -153,6 +154,17 @@ def test_errors_are_in_degrees(found_page, extended_page, case):
     said = re.search(r'Adding payload_error takes the error on the unseen recording from ([\d.]+) '
                      r'to \S+ deg RMS', words_of(extended_page))
     assert float(said[1]) == pytest.approx(57.29578 * case[3].test['rmse_before'], rel=0.02)
+
+
+def test_charts_judge_what_the_page_is_about(found_page, extended_page, case):
+    """Of a diagnosis the model as it is, of an extension the extended one."""
+    data = [json.loads(re.search('id="recording">([^<]*)<', text)[1])
+            for text in (found_page, extended_page)]
+    assert [content['predictions'][content['main']]['role'] for content in data] == [
+        'model', 'after']
+    assert [content['predictions'][1]['name'] for content in data] == 2 * ['with payload_error']
+    # Its largest residual, which bounds the colours of the loop.
+    assert data[1]['limit'] < 0.2 * data[0]['limit']
 
 
 def test_nothing_found_is_a_page_too(case, tmp_path):

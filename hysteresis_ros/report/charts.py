@@ -21,36 +21,38 @@ LINES = ('Response, and below it the residual; the grey band is the noise floor,
 LOOP = 'The loop of drive and response; where on it the model fails.'
 
 
-def explorer(comparison: Comparison, after: Comparison | None = None, with_effects: str = '',
-             pictures: dict[str, bytes] | None = None) -> str:
+def explorer(before: Comparison, after: Comparison | None = None, with_effects: str = '',
+             judge_after: bool = False, pictures: dict[str, bytes] | None = None) -> str:
     """
     Return response, residual and loop of a recording, with the controls of the page's script.
 
     Parameters
     ----------
-    comparison : Comparison
-        Its residual colours the loop, and its regions are shaded.
+    before : Comparison
     after : Comparison, optional
         The same rows with more effects.
     with_effects : str
         What the curve of `after` is called.
+    judge_after : bool
+        Whether the loop's colours, the regions and the charts of the signals are those of `after`.
     pictures : dict of str to bytes, optional
-        PNG files by name that were drawn already; what is missing of `overlay` and `loop` is drawn.
+        PNG files by name that were drawn already; by default `overlay` and `loop` are drawn.
 
     Returns
     -------
     str
         HTML. Without the script the pictures stay.
     """
-    drawn = pictures or {'overlay': png(overlay(comparison, after)),
+    comparison = after if judge_after and after is not None else before
+    drawn = pictures or {'overlay': png(overlay(before, after)),
                          'loop': png(residual_on_loop(comparison))}
-    curves = [Curve(short_name(comparison.name), 'model', comparison.predicted)]
+    curves = [Curve(short_name(before.name), 'model', before.predicted)]
     if after is not None:
         curves.append(Curve(with_effects, 'after', after.predicted))
-    if comparison.linear_predicted is not None:
-        curves.append(Curve('linear model', 'linear', comparison.linear_predicted))
-    content = recording(comparison, curves)
-    said = descriptions(comparison, after)
+    if before.linear_predicted is not None:
+        curves.append(Curve('linear model', 'linear', before.linear_predicted))
+    content = recording(comparison, curves, int(comparison is after))
+    said = {**descriptions(comparison), 'overlay': descriptions(before, after)['overlay']}
     note = ([] if content['drawn'] == comparison.rows else [page.paragraph(
         f'{content["drawn"]} of {comparison.rows} rows are drawn: of each stretch the extremes.')])
     figures = [page.picture(drawn[kind], caption, said[kind], chart)

@@ -119,7 +119,8 @@ def write_extension(path: AnyPath, model: MuscleModel, extension: Extension,
     rows = [[linked(effect.id), name, f'{entry["value"]:.4g}', f'{entry["low"]:.4g}',
              f'{entry["high"]:.4g}', entry['unit']] for effect in extension.added
             for name, entry in effect.to_dict()['parameters'].items()]
-    parts += [page.section('Response and residual', explorer(before, after, f'with {names}')),
+    parts += [page.section('Response and residual', explorer(
+        before, after, f'with {names}', judge_after=True)),
               page.section('Parameters', page.table(
                   ['effect', 'parameter', 'value', 'low', 'high', 'unit'], rows)),
               page.section('Before and after', *errors(after)),

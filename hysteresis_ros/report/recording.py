@@ -39,7 +39,7 @@ class Curve(NamedTuple):
     values: np.ndarray
 
 
-def recording(comparison: Comparison, curves: Sequence[Curve]) -> dict[str, Any]:
+def recording(comparison: Comparison, curves: Sequence[Curve], main: int = 0) -> dict[str, Any]:
     """
     Return what the charts of a page draw.
 
@@ -48,7 +48,9 @@ def recording(comparison: Comparison, curves: Sequence[Curve]) -> dict[str, Any]
     comparison : Comparison
         Its residual colours the loop, and its regions are shaded.
     curves : sequence of Curve
-        Predicted responses; the first one is that of `comparison`.
+        Predicted responses.
+    main : int
+        Which of them is that of `comparison`.
 
     Returns
     -------
@@ -70,7 +72,7 @@ def recording(comparison: Comparison, curves: Sequence[Curve]) -> dict[str, Any]
         'predictions': [{'name': curve.name, 'role': curve.role,
                          'values': packed(scaled(quantity, curve.values[rows]))}
                         for curve in curves],
-        'main': 0,
+        'main': main,
         'limit': max(float(np.quantile(np.abs(residual), 0.99)), 1e-12),
         'noise': float(floor) if np.isfinite(floor) else 0.0,
         'trials': trials(comparison, rows),
