@@ -54,6 +54,13 @@ def test_tied_effects_have_their_values_and_the_probability_of_all():
     assert 'or <a' in values_of(found)
 
 
+def test_the_headline_names_every_missing_effect():
+    found = diagnosis(missing=['payload_error', 'slack'], alternatives=[['encoder_offset'], []])
+    card = diagnosis_card(found, 'angle', 'm.yaml', ['a.csv'], Origin())
+    assert words_of(card).split('\n')[1] == (
+        'Missing: one of payload_error, encoder_offset; and slack')
+
+
 @pytest.mark.parametrize('value, words', [
     (1.0, 'more than 0.99'), (0.0, 'less than 0.01'), (0.936, '0.94')])
 def test_no_probability_is_said_to_be_certain(value, words):

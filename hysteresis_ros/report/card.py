@@ -68,6 +68,10 @@ def diagnosis_card(found: Diagnosis, quantity: str, model_path: str, sources: Se
         HTML.
     """
     headline, _, rest = verdict_in_words(found).partition('. ')
+    if found.verdict == 'missing':
+        headline = 'Missing: ' + '; and '.join(
+            f'one of {", ".join([name, *others])}' if others else name
+            for name, others in zip(found.missing, found.alternatives))
     facts = [(title, text) for title, text in (
         ('Value, with 95 % interval', values_of(found)),
         ('Probability', probability_of(found)),
