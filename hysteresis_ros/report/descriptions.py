@@ -30,7 +30,7 @@ def descriptions(comparison: Comparison, after: Comparison | None = None) -> dic
     Returns
     -------
     dict of str to str
-        By the name of the picture, as in `figures`.
+        By the name of the picture, as in `figures`; `waterfall` is bars with numbers on a page.
     """
     where = comparison.where[0].text if comparison.where else 'the error is much the same'
     found = {'overlay': _overlay(comparison, after), 'loop': _loop(comparison),
@@ -42,11 +42,6 @@ def descriptions(comparison: Comparison, after: Comparison | None = None) -> dic
                  _range(comparison, name, values) for name, values in (
                      (comparison.drive, comparison.signals.get(comparison.drive)),
                      (comparison.quantity, comparison.measured)) if values is not None) + '.'}
-    if comparison.extensions:
-        unit, scale = shown(comparison.quantity)
-        found['waterfall'] = 'RMSE of the model as effects are added: ' + ', '.join(
-            f'{name} {number(scale * errors.rmse)} {unit}'
-            for name, errors in comparison.extensions) + '.'
     return found
 
 
