@@ -120,8 +120,8 @@ setup(
     license='Apache-2.0',
     keywords=['ROS', 'hysteresis', 'Preisach', 'artificial muscle', 'shape memory alloy'],
     packages=find_packages(include=[PACKAGE, PACKAGE + '.*']),
-    # Tells type checkers that our annotations are meant for them.
-    package_data={PACKAGE: ['py.typed']},
+    # The first tells type checkers that our annotations are meant for them.
+    package_data={PACKAGE: ['py.typed', 'report/web/*.css', 'report/web/*.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + PACKAGE]),
         ('share/' + PACKAGE, ['package.xml']),

@@ -92,7 +92,9 @@ def test_compare_writes_table_json_page_and_pictures(bench, capsys):
     for picture in (out / 'plots').iterdir():
         assert picture.read_bytes().startswith(b'\x89PNG')
     assert not re.search(r'(src|href)="(?!data:image/png;base64,)', page)
-    assert '<script' not in page and "default-src 'none'" in page
+    assert page.count('<script>') == 1 and "default-src 'none'" in page
+    assert page.count(read_measurement(bench / 'length.csv').digest) == 1
+    assert f'hysteresis compare --model {bench}/model.yaml --data {bench}/length.csv' in page
 
 
 def test_json_to_standard_output_is_nothing_but_json(bench, capsys):

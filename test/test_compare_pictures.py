@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from hypothesis import given, strategies
 from hysteresis_ros.report import page
 from hysteresis_ros.comparison.compare import compare
-from hysteresis_ros.report.comparison_page import comparison_page, rendered, summary, trials
+from hysteresis_ros.report.comparison_page import comparison_page, rendered, trials
 from hysteresis_ros.report.drawing import new_figure, png, thinned
 from hysteresis_ros.report.plots import along, figures
 from hysteresis_ros.measurements import Measurement
@@ -44,7 +44,7 @@ def test_overlay_shows_measured_predicted_and_residual_in_degrees(comparison):
     assert {'measured', 'two-stage', 'linear'} <= set(labels)
     assert axes[0].get_ylabel() == 'angle [deg]'
     line = axes[0].lines[labels.index('measured')]
-    assert line.get_ydata().max() == pytest.approx(np.rad2deg(comparison.measured.max()))
+    assert np.nanmax(line.get_ydata()) == pytest.approx(np.rad2deg(comparison.measured.max()))
     grey = sorted(np.dot(matplotlib.colors.to_rgb(line.get_color()), [0.3, 0.59, 0.11])
                   for line in axes[0].lines[:3])
     assert np.all(np.diff(grey) > 0.15)
@@ -90,7 +90,7 @@ def test_many_trials_are_listed_worst_first():
     found = compare(FakeModel(), [stepped(trials=3)])
     html = comparison_page(found, {}, 'm.yaml')
     assert 'The 2 worst of 3 trials.' in ''.join(trials(found, most=2))
-    assert html.count('<td>memory</td>') == 3
+    assert len(re.findall('<td data-label="file">memory</td>', html)) == 3
     assert len(figures(found)['overlay'].axes[0].lines) == 5
 
 
@@ -133,21 +133,26 @@ def test_the_page_says_the_verdict_and_holds_the_pictures(comparison):
     pictures = re.findall(r'src="data:image/png;base64,([^"]+)"', html)
     assert {base64.b64decode(p) for p in pictures} == set(drawn.values())
     assert html.startswith('<!DOCTYPE html>') and html.count('<h1>') == 1
-    assert summary(comparison) in html.replace('&#x27;', "'")
-    assert '° ' not in summary(comparison)
-    assert 'deg' in summary(comparison) and 'linear' in summary(comparison)
+    words = re.sub('<[^>]*>', '', html)
+    off = np.rad2deg(comparison.model.mean_abs)
+    assert re.search(r'Off by ([\d.]+) deg on average over 6000 rows', words)
+    assert float(re.search(r'Off by ([\d.]+) deg', words)[1]) == pytest.approx(off, rel=0.01)
+    assert '° ' not in words and 'RMSE of the linear model' in words
+    assert 'hysteresis diagnose --model' in words
 
 
 @given(strategies.text())
 def test_every_part_of_a_page_escapes_its_text(text):
     nasty = text + '<script>alert("x")</script>\'&'
     html = page.page(
-        nasty, page.section(nasty, page.paragraph(nasty), page.verdict(nasty)),
+        nasty, page.section(nasty, page.paragraph(nasty), page.facts([(nasty, nasty)])),
         page.warning(nasty), page.listing([nasty]), page.listing([nasty], ordered=False),
         page.table([nasty], [[nasty]], strong=[0]), page.picture(b'png', nasty),
-        page.details(nasty, page.paragraph(nasty)), footer=nasty)
-    assert '<script' not in html
-    assert html.count('&lt;script&gt;') == 15
+        page.details(nasty, page.paragraph(nasty)), page.bars([page.Bar(nasty, 1.0)], 'deg'),
+        footer=nasty)
+    # The page's own script is the only one.
+    assert html.count('<script') == 1
+    assert html.count('&lt;script&gt;') == 18
     assert not re.search(r'alt="[^"]*"x"', html)
 
 

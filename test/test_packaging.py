@@ -192,6 +192,16 @@ def test_type_checkers_of_users_see_our_hints(wheel):
         assert 'hysteresis_ros/py.typed' in archive.namelist()
 
 
+def test_style_and_script_of_pages_are_installed(wheel, prefix, root):
+    """By pip and by colcon."""
+    names = {path.name for path in (root / 'hysteresis_ros/report/web').iterdir()}
+    with zipfile.ZipFile(wheel) as archive:
+        packed = {name.rpartition('/')[2] for name in archive.namelist() if '/report/web/' in name}
+    built = next(prefix.glob('lib/python*/site-packages/hysteresis_ros/report/web'))
+    assert packed == {path.name for path in built.iterdir()} == names
+    assert {'page.css', 'chart.js'} < names
+
+
 def test_the_wheel_holds_the_package_alone(wheel):
     """Tests, tools and benchmarks stay in the checkout."""
     with zipfile.ZipFile(wheel) as archive:

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages of a diagnosis and of an extension: they need nothing but themselves."""
 
+from html import unescape
 from html.parser import HTMLParser
+import json
 import re
 
 from model_support import arm_run, bicep_model, effect_of, wandering_voltage
@@ -13,6 +15,7 @@ from hysteresis_ros.cli.diagnose import to_text
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.verdict import shown_or_not
 from hysteresis_ros.report.diagnosis_page import write_diagnosis, write_extension
+from hysteresis_ros.report.resources import script, script_digest
 from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
 from hysteresis_ros.measurements import Measurement
 
@@ -74,14 +77,23 @@ class Elements(HTMLParser):
                 self.handlers.append(name)
 
 
+def words_of(text):
+    """Return what a page says, without its pictures, style and script."""
+    text = re.sub(r'<(style|script)\b.*?</\1>', '', text, flags=re.DOTALL)
+    return unescape(re.sub('<[^>]*>', '', text))
+
+
 def check_self_contained(text):
-    """Nothing is fetched, nothing runs, and a phone shows it at its own width."""
+    """Nothing is fetched, no script but our own runs, and a phone shows it at its own width."""
     elements = Elements(text)
-    assert 'script' not in elements.names and 'iframe' not in elements.names
+    assert 'iframe' not in elements.names
+    assert text.count('<script') == 2 and f'<script>{script()}</script>' in text
+    assert f"script-src '{script_digest()}'" in text and "default-src 'none'" in text
     assert elements.handlers == []
+    assert len(text) < 1.5e6
     assert elements.addresses, 'a page without a picture'
     assert all(address.startswith(('data:image/', '#')) for address in elements.addresses)
-    without_pictures = re.sub(r'data:image/[^"]*', '', text)
+    without_pictures = re.sub(r'data:image/[^"]*', '', text).replace(script(), '')
     assert not re.search(r'https?://|@import|url\(', without_pictures)
     assert 'name="viewport"' in text and '<!doctype html>' in text.lower()
     assert '@media print' in text
@@ -118,29 +130,41 @@ def test_the_page_of_an_extension_needs_nothing_but_itself(extended_page):
 def test_names_of_files_are_text(found_page, extended_page):
     """What stands in angle brackets is shown and not obeyed."""
     for text in (found_page, extended_page):
-        assert '<script' not in text
         assert '&lt;script&gt;alert(1)&lt;/script&gt;&amp;run.csv' in text
     assert 'weigh the payload &amp; the forearm' in found_page
 
 
 def test_the_verdict_comes_first(found_page):
     """Then where it fails, the effects, the alternatives, what could not show, provenance."""
-    order = ['Missing: one of payload_error, encoder_offset', 'What to do next', 'Where it fails',
-             'Effects, by what they do on rows not fitted', 'Alternatives',
+    order = ['Missing: one of payload_error, encoder_offset', 'What to do next',
+             'Response and residual', 'Where it fails',
+             'Effects, by what they do on rows not fitted', 'Probabilities', 'Alternatives',
              'What this recording could not show', 'Before and after',
-             'What the error is made of', 'Provenance']
-    places = [found_page.index(words) for words in order]
+             'What the error is made of', 'Provenance', 'Glossary of effects']
+    text = words_of(found_page)
+    places = [text.index(words) for words in order]
     assert places == sorted(places)
-    assert 'payload_error cannot be told from encoder_offset' in found_page
-    assert 'latency: every row is settled' in found_page
+    assert 'payload_error cannot be told from encoder_offset' in text
+    assert 'latency: every row is settled' in text
 
 
 def test_errors_are_in_degrees(found_page, extended_page, case):
     """The page shows the unit that a person thinks in."""
     assert 'RMSE [deg]' in found_page
     said = re.search(r'Adding payload_error takes the error on the unseen recording from ([\d.]+) '
-                     r'to \S+ deg RMS', extended_page)
+                     r'to \S+ deg RMS', words_of(extended_page))
     assert float(said[1]) == pytest.approx(57.29578 * case[3].test['rmse_before'], rel=0.02)
+
+
+def test_charts_judge_what_the_page_is_about(found_page, extended_page, case):
+    """Of a diagnosis the model as it is, of an extension the extended one."""
+    data = [json.loads(re.search('id="recording">([^<]*)<', text)[1])
+            for text in (found_page, extended_page)]
+    assert [content['predictions'][content['main']]['role'] for content in data] == [
+        'model', 'after']
+    assert [content['predictions'][1]['name'] for content in data] == 2 * ['with payload_error']
+    # Its largest residual, which bounds the colours of the loop.
+    assert data[1]['limit'] < 0.2 * data[0]['limit']
 
 
 def test_nothing_found_is_a_page_too(case, tmp_path):
@@ -150,7 +174,7 @@ def test_nothing_found_is_a_page_too(case, tmp_path):
         'adequate', missing=[], alternatives=[], ranking=[]), 'model.yaml')
     text = (tmp_path / 'p.html').read_text(encoding='utf-8')
     check_self_contained(text)
-    assert 'Adequate' in text and 'Before and after' not in text
+    assert 'Adequate' in words_of(text) and 'Before and after' not in words_of(text)
 
 
 def test_a_value_outside_its_range_is_warned_of(case, tmp_path):

@@ -4,7 +4,10 @@
 
 import argparse
 from collections.abc import Collection, Iterable, Mapping, Sequence
+import csv
+import io
 import json
+import shlex
 import sys
 from typing import Any, TextIO, TYPE_CHECKING, TypeVar
 
@@ -17,6 +20,7 @@ from hysteresis_ros.measurements import Mapped, Measurement, parse_columns, read
 
 if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.report.provenance import Origin
 
 Item = TypeVar('Item')
 # What `ArgumentParser.add_subparsers` returns; argparse has no public name for it.
@@ -244,6 +248,23 @@ def warn_of_loads(model: 'MuscleModel', measurements: Sequence[Measurement]) -> 
     angles = [m.column('angle') for m in measurements if m.response == 'angle']
     if angles:
         warn(load_in_words(model, np.concatenate(angles)))
+
+
+def origin(args: argparse.Namespace) -> 'Origin':
+    """Return the command that runs, and its options that say how recordings are read."""
+    from hysteresis_ros.report.provenance import Origin
+
+    reading: list[str] = []
+    if getattr(args, 'namespace', None):
+        reading += ['--namespace', args.namespace]
+    if getattr(args, 'columns', ()):
+        text = io.StringIO()
+        csv.writer(text, lineterminator='').writerow(str(entry) for entry in args.columns)
+        reading += ['--columns', text.getvalue()]
+    if getattr(args, 'settled', False):
+        reading.append('--settled')
+    words = getattr(args, 'words', None)
+    return Origin(shlex.join(['hysteresis', *words]) if words else '', tuple(reading))
 
 
 def say(args: argparse.Namespace, text: str) -> None:

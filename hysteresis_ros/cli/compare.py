@@ -5,17 +5,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, read_all, say, Steps, Subparsers, warn,
-    warn_of_loads, write_json)
+    add_data, add_json, add_model, add_report, add_settled, origin, read_all, say, Steps,
+    Subparsers, warn, warn_of_loads, write_json)
 from hysteresis_ros.cli.outputs import OutputFolder
 
 if TYPE_CHECKING:
     from hysteresis_ros.comparison.compare import Comparison
+    from hysteresis_ros.measurements import Measurement
 
 
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
@@ -56,10 +58,11 @@ def run(args: argparse.Namespace) -> None:
     if args.json:
         write_json(args.json, comparison.to_dict())
     if args.report or args.plots:
-        draw(args, comparison, steps)
+        draw(args, comparison, measurements, steps)
 
 
-def draw(args: argparse.Namespace, comparison: Comparison, steps: Steps) -> None:
+def draw(args: argparse.Namespace, comparison: Comparison, measurements: Sequence[Measurement],
+         steps: Steps) -> None:
     """Write the page and the pictures that were asked for."""
     from hysteresis_ros.report.comparison_page import comparison_page, rendered
     from hysteresis_ros.report.plots import figures
@@ -70,5 +73,6 @@ def draw(args: argparse.Namespace, comparison: Comparison, steps: Steps) -> None
         for name, picture in pictures.items():
             write_bytes(Path(args.plots) / f'{name}.png', picture)
     if args.report:
-        write_text(args.report, comparison_page(comparison, pictures, args.model))
+        write_text(args.report, comparison_page(comparison, pictures, args.model, origin(args),
+                                                measurements))
     steps.clear()

@@ -9,8 +9,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, read_all, say, Subparsers,
-    warn_of_loads, write_json)
+    add_data, add_json, add_model, add_report, add_settled, origin, read_all, say,
+    Subparsers, warn_of_loads, write_json)
 from hysteresis_ros.cli.rounds import BENCH, Rounds
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> None:
         write_json(args.json, found.to_dict())
     if args.report:
         from hysteresis_ros.report.diagnosis_page import write_diagnosis
-        write_diagnosis(args.report, model, measurements, found, args.model)
+        write_diagnosis(args.report, model, measurements, found, args.model, origin(args))
 
 
 def to_text(found: Diagnosis, response: str) -> str:

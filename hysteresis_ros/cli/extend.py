@@ -9,8 +9,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_columns, add_json, add_model, add_report, add_settled, read_all, say, Subparsers,
-    warn, write_json)
+    add_columns, add_json, add_model, add_report, add_settled, origin, read_all, say,
+    Subparsers, warn, write_json)
 from hysteresis_ros.cli.diagnose import UNITS
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 
@@ -63,7 +63,8 @@ def run(args: argparse.Namespace) -> None:
         write_json(args.json, extension.to_dict())
     if args.report:
         from hysteresis_ros.report.diagnosis_page import write_extension
-        write_extension(args.report, model, extension, train, test, args.output)
+        write_extension(args.report, model, extension, train, test, args.output,
+                        origin(args))
 
 
 def to_text(extension: Extension, response: str) -> str:

@@ -43,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     parser = build_parser(arguments)
     args = parser.parse_args(arguments)
+    args.words = arguments
     with warnings.catch_warnings():
         warnings.simplefilter('always', MeasurementWarning)
         warnings.showwarning = show_warning

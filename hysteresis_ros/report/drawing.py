@@ -20,6 +20,8 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from hysteresis_ros.comparison.compare import Comparison
+
 # One value or an array of them.
 Values = TypeVar('Values', float, np.ndarray)
 
@@ -81,6 +83,17 @@ def new_figure(width: float, height: float, rows: int = 1, columns: int = 1,
             axis.spines[side].set_visible(False)
         axis.tick_params(labelsize=8)
     return figure, axes
+
+
+def along(comparison: Comparison) -> tuple[np.ndarray, str]:
+    """Return what runs along a recording, (rows,), and its name: time, or the row's number."""
+    if comparison.time is None:
+        return np.arange(comparison.rows, dtype=float), 'row'
+    if comparison.time[-1] > 3 * 3600:
+        return comparison.time / 3600, 'time [h]'
+    if comparison.time[-1] > 600:
+        return comparison.time / 60, 'time [min]'
+    return comparison.time, 'time [s]'
 
 
 def axis_label(name: str) -> str:

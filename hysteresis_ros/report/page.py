@@ -1,52 +1,56 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Parts of a self-contained HTML page: no scripts, no network, readable on a phone and in print.
+Parts of a self-contained HTML page: no network, readable on a phone, in the dark and in print.
 
 Every function escapes the text it is given, names of files and columns included, and returns
-HTML that `page` puts together.
+HTML that `page` puts together. Text that is HTML already comes as `Html`.
 """
 
 from collections.abc import Collection, Iterable, Sequence
 from html import escape
+import re
+from typing import NamedTuple
 
+from hysteresis_ros.comparison.where import number
 from hysteresis_ros.report.drawing import data_address
+from hysteresis_ros.report.resources import script, script_digest, style
 
-STYLE = """
-:root { color-scheme: light; }
-* { box-sizing: border-box; }
-body { margin: 0 auto; max-width: 62rem; padding: 1rem 1rem 3rem; color: #1a1f26;
-  background: #fff; font: 16px/1.5 system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif;
-  overflow-wrap: anywhere; }
-h1 { font-size: 1.5rem; line-height: 1.25; margin: .6rem 0 .2rem; }
-h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; border-bottom: 1px solid #ccd3db;
-  padding-bottom: .2rem; }
-p { margin: .5rem 0; } li { margin: .25rem 0; }
-.verdict { border-left: 5px solid #2f6db5; background: #f1f5fa; padding: .7rem 1rem;
-  font-size: 1.08rem; margin: 1rem 0; }
-.warning { border-left: 5px solid #c9822b; background: #fdf5e9; padding: .5rem 1rem;
-  margin: .6rem 0; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .93rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .3rem .7rem; text-align: right; border-bottom: 1px solid #dde3e9;
-  overflow-wrap: normal; }
-th { border-bottom: 2px solid #8b98a6; vertical-align: bottom; }
-th:first-child, td:first-child { text-align: left; }
-tr.strong td { font-weight: 600; background: #f1f5fa; }
-figure { margin: 1rem 0; break-inside: avoid; }
-img { max-width: 100%; height: auto; display: block; }
-figcaption { font-size: .88rem; color: #48535f; margin-top: .2rem; }
-details { margin: .6rem 0; } summary { cursor: pointer; }
-footer { margin-top: 2.5rem; color: #5a6672; font-size: .85rem; }
-@media screen and (max-width: 40rem) {
-  /* A picture is read by moving it sideways, like a table, not with a magnifying glass. */
-  figure { overflow-x: auto; } img { max-width: none; width: 44rem; }
-  figcaption { position: sticky; left: 0; width: calc(100vw - 2rem); }
-  td { white-space: nowrap; } }
-@media print { body { max-width: none; padding: 0; font-size: 10.5pt; }
-  h2 { break-after: avoid; } .verdict, .warning, tr.strong td { background: none; }
-  .scroll { overflow: visible; } tr { break-inside: avoid; } }
-"""
+# Facts with more characters take the whole width.
+LONG = 90
+
+
+class Html(str):
+    """Text that is HTML already and is not escaped again."""
+
+
+class Bar(NamedTuple):
+    """
+    A number to be drawn as a bar.
+
+    Attributes
+    ----------
+    name : str
+        Text or Html.
+    value : float
+    low, high : float or None
+        Its interval.
+    strong, hollow : bool
+        Whether it is brought out, and whether it is only an outline.
+
+    """
+
+    name: str
+    value: float
+    low: float | None = None
+    high: float | None = None
+    strong: bool = False
+    hollow: bool = False
+
+
+def html(text: str) -> Html:
+    """Return text as HTML: escaped, unless it is HTML already."""
+    return text if isinstance(text, Html) else Html(escape(text))
 
 
 def page(title: str, *parts: str, footer: str = '') -> str:
@@ -64,17 +68,20 @@ def page(title: str, *parts: str, footer: str = '') -> str:
     Returns
     -------
     str
-        A whole HTML document that forbids itself scripts and the network.
+        A whole HTML document, which forbids itself the network and every script but its own. All
+        that it says can be read without the script, too.
 
     """
-    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    policy = (f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
+              f"script-src '{script_digest()}'")
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n'
-        f'<h1>{escape(title)}</h1>\n' + '\n'.join(parts)
-        + f'\n<footer>{escape(footer)}</footer>\n</body>\n</html>\n')
+        f'<title>{escape(title)}</title>\n<style>{style()}</style>\n</head>\n<body>\n'
+        f'<main>\n<h1>{escape(title)}</h1>\n' + '\n'.join(parts)
+        + f'\n</main>\n<footer>{escape(footer)}</footer>\n'
+        f'<script>{script()}</script>\n</body>\n</html>\n')
 
 
 def section(heading: str, *parts: str) -> str:
@@ -84,29 +91,74 @@ def section(heading: str, *parts: str) -> str:
 
 def paragraph(text: str) -> str:
     """Return a paragraph of text."""
-    return f'<p>{escape(text)}</p>'
-
-
-def verdict(text: str) -> str:
-    """Return the sentence that a hurried reader should see, set apart."""
-    return f'<p class="verdict">{escape(text)}</p>'
+    return f'<p>{html(text)}</p>'
 
 
 def warning(text: str) -> str:
     """Return something that a reader should not overlook."""
-    return f'<p class="warning">{escape(text)}</p>'
+    return f'<p class="warning">{html(text)}</p>'
 
 
 def listing(items: Iterable[str], ordered: bool = True) -> str:
     """Return a list of texts, numbered or not."""
     tag = 'ol' if ordered else 'ul'
-    return f'<{tag}>' + ''.join(f'<li>{escape(item)}</li>' for item in items) + f'</{tag}>'
+    return f'<{tag}>' + ''.join(f'<li>{html(item)}</li>' for item in items) + f'</{tag}>'
+
+
+def facts(entries: Iterable[Sequence[str]]) -> str:
+    """Return names and what is said of them, (name, content), in two columns; long ones in one."""
+    found = [(name, html(content)) for name, content in entries if content]
+    return '<dl class="facts">' + ''.join(
+        ('<div class="wide">' if len(re.sub('<[^>]*>', '', content)) > LONG else '<div>')
+        + f'<dt>{html(name)}</dt><dd>{content}</dd></div>' for name, content in found) + '</dl>'
+
+
+def command(text: str) -> Html:
+    """Return a command of the terminal, which the page's script gives a button to copy it."""
+    return Html(f'<div class="command"><code>{escape(text)}</code></div>')
+
+
+def bars(rows: Sequence[Bar], unit: str) -> str:
+    """
+    Return numbers with a bar after each.
+
+    Parameters
+    ----------
+    rows : sequence of Bar
+    unit : str
+        Of the values.
+
+    Returns
+    -------
+    str
+
+    """
+    ends = [row.high if row.high is not None else row.value for row in rows]
+    longest = max([row.value for row in rows] + ends, default=0.0) or 1.0
+
+    def percent(value: float) -> str:
+        return f'{100.0 * min(max(value / longest, 0.0), 1.0):.2f}%'
+
+    items = []
+    for row in rows:
+        kind = ' '.join(['strong'] * row.strong + ['hollow'] * row.hollow)
+        interval, line = '', ''
+        if row.low is not None and row.high is not None:
+            interval = f' ({number(row.low)} to {number(row.high)})'
+            line = (f'<i style="left:{percent(row.low)};'
+                    f'width:calc({percent(row.high)} - {percent(row.low)})"></i>')
+        items.append(
+            f'<li class="{kind}"><span class="name">{html(row.name)}</span>'
+            f'<span class="value">{number(row.value)} {escape(unit)}{interval}</span>'
+            f'<span class="bar" aria-hidden="true"><span style="width:{percent(row.value)}">'
+            f'</span>{line}</span></li>\n')
+    return '<ul class="bars">\n' + ''.join(items) + '</ul>'
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]],
           strong: Collection[int] = ()) -> str:
     """
-    Return a table that scrolls sideways on a narrow screen.
+    Return a table; on a narrow screen each row becomes a block of names and numbers.
 
     Parameters
     ----------
@@ -120,16 +172,18 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]],
     str
 
     """
-    head = ''.join(f'<th scope="col">{escape(str(cell))}</th>' for cell in header)
+    head = ''.join(f'<th scope="col">{html(str(cell))}</th>' for cell in header)
+    labels = [escape(str(cell)) for cell in header]
     body = ''.join(
         ('<tr class="strong">' if n in strong else '<tr>')
-        + ''.join(f'<td>{escape(str(cell))}</td>' for cell in row) + '</tr>\n'
+        + ''.join(f'<td data-label="{name}">{html(cell)}</td>'
+                  for name, cell in zip(labels, row)) + '</tr>\n'
         for n, row in enumerate(rows))
     return (f'<div class="scroll"><table>\n<thead><tr>{head}</tr></thead>\n'
             f'<tbody>\n{body}</tbody>\n</table></div>')
 
 
-def picture(png: bytes, caption: str) -> str:
+def picture(png: bytes, caption: str, alt: str = '', chart: str = '') -> str:
     """
     Return a picture that is part of the page.
 
@@ -138,16 +192,25 @@ def picture(png: bytes, caption: str) -> str:
     png : bytes
         A PNG file.
     caption : str
-        Says what is seen; also read out in place of the picture.
+        Stands below it.
+    alt : str
+        Says what the picture shows to whoever does not see it; the caption by default.
+    chart : {'', 'lines', 'loop', 'signals'}
+        The chart that the page's script puts in its place.
 
     Returns
     -------
     str
 
     """
-    text = escape(caption)
-    return (f'<figure><img alt="{text}" src="{data_address(png)}">'
-            f'<figcaption>{text}</figcaption></figure>')
+    kind = f' data-chart="{chart}"' if chart else ''
+    return (f'<figure{kind}><img alt="{escape(alt or caption)}" src="{data_address(png)}">'
+            f'<figcaption>{html(caption)}</figcaption></figure>')
+
+
+def data(name: str, text: str) -> str:
+    """Return an element that holds JSON for the page's script; `as_json` makes it safe."""
+    return f'<script type="application/json" id="{escape(name)}">{text}</script>'
 
 
 def details(summary: str, *parts: str) -> str:

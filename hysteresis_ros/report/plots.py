@@ -12,10 +12,12 @@ from collections.abc import Sequence
 
 from typing import Any, TYPE_CHECKING
 
-from hysteresis_ros.report.drawing import axis_label, new_figure, scaled, some_rows, thinned
+from hysteresis_ros.report.drawing import (
+    along, axis_label, MOST_POINTS, new_figure, scaled, some_rows, thinned)
 from hysteresis_ros.comparison.signals import label
 from hysteresis_ros.comparison.where import binned, blocks_of, correlogram
 from hysteresis_ros.measurements.quantities import shown
+from hysteresis_ros.report.words import short_name
 import numpy as np
 
 if TYPE_CHECKING:
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 MEASURED: dict[str, Any] = {'color': '#000000', 'linewidth': 1.3, 'linestyle': '-'}
 MODEL: dict[str, Any] = {'color': '#2f6db5', 'linewidth': 1.3, 'linestyle': (0, (5, 1.5))}
 LINEAR: dict[str, Any] = {'color': '#d98a1f', 'linewidth': 1.3, 'linestyle': (0, (1, 1))}
+AFTER: dict[str, Any] = {'color': '#1f8a4c', 'linewidth': 1.3, 'linestyle': '-'}
 DOTS: dict[str, Any] = {'color': '#9aa7b5', 'markersize': 2.0, 'linestyle': 'none',
                         'marker': '.', 'alpha': 0.5}
 MEANS: dict[str, Any] = {'color': '#12355b', 'linewidth': 1.4, 'marker': 'o',
@@ -68,13 +71,15 @@ def figures(comparison: Comparison) -> dict[str, Figure]:
     return drawn
 
 
-def overlay(comparison: Comparison) -> Figure:
+def overlay(comparison: Comparison, after: Comparison | None = None) -> Figure:
     """
-    Draw measured and predicted response, and below what is left.
+    Draw measured and predicted response, and below the residual; trials are not joined.
 
     Parameters
     ----------
     comparison : Comparison
+    after : Comparison, optional
+        Another model on the same rows, such as one with more effects.
 
     Returns
     -------
@@ -85,15 +90,22 @@ def overlay(comparison: Comparison) -> Figure:
     figure, axes = new_figure(9, 5.2, 2, 1, sharex=True, height_ratios=[2, 1])
     top, bottom = axes[:, 0]
     x, name = along(comparison)
+    curves = [(comparison.predicted, short_name(comparison.name), MODEL)]
+    if after is not None:
+        curves.append((after.predicted, short_name(after.name), AFTER))
     if comparison.linear_predicted is not None:
-        top.plot(*thinned(x, scaled(quantity, comparison.linear_predicted)), label='linear',
-                 **LINEAR)
-    top.plot(*thinned(x, scaled(quantity, comparison.measured)), label='measured', **MEASURED)
-    top.plot(*thinned(x, scaled(quantity, comparison.predicted)), label=comparison.name, **MODEL)
-    if comparison.linear_predicted is not None:
-        left = comparison.measured - comparison.linear_predicted
-        bottom.plot(*thinned(x, scaled(quantity, left)), **LINEAR)
-    bottom.plot(*thinned(x, scaled(quantity, comparison.residual)), **MODEL)
+        curves.insert(0, (comparison.linear_predicted, 'linear', LINEAR))
+
+    def draw(axis: Axes, values: np.ndarray, **style: Any) -> None:
+        axis.plot(*separated(x, scaled(quantity, values), comparison.trial), **style)
+
+    for values, text, style in curves:
+        draw(bottom, comparison.measured - values, **style)
+    # The measured response lies above the linear model, and below those that should meet it.
+    curves.insert(int(comparison.linear_predicted is not None),
+                  (comparison.measured, 'measured', MEASURED))
+    for values, text, style in curves:
+        draw(top, values, label=text, **style)
     bottom.axhline(0.0, color='black', linewidth=0.8)
     noise = scaled(quantity, comparison.floor.value)
     bottom.axhspan(-noise, noise, color='#cccccc', alpha=0.6, linewidth=0)
@@ -103,19 +115,21 @@ def overlay(comparison: Comparison) -> Figure:
     top.set_ylabel(axis_label(quantity))
     bottom.set_ylabel(f'measured - predicted\n[{label(quantity)[1] or "1"}]', fontsize=8)
     bottom.set_xlabel(name)
-    top.legend(fontsize=8, ncols=3, frameon=False, loc='lower left', bbox_to_anchor=(0, 1))
+    top.legend(fontsize=8, ncols=4, frameon=False, loc='lower left', bbox_to_anchor=(0, 1))
     return figure
 
 
-def along(comparison: Comparison) -> tuple[np.ndarray, str]:
-    """Return what runs along a recording, (rows,), and its name: time, or the row's number."""
-    if comparison.time is None:
-        return np.arange(comparison.rows, dtype=float), 'row'
-    if comparison.time[-1] > 3 * 3600:
-        return comparison.time / 3600, 'time [h]'
-    if comparison.time[-1] > 600:
-        return comparison.time / 60, 'time [min]'
-    return comparison.time, 'time [s]'
+def separated(x: np.ndarray, y: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a line, thinned trial by trial, with a gap (NaN) between trials."""
+    count = int(trial[-1]) + 1
+    xs, ys = [], []
+    for number in range(count):
+        inside = trial == number
+        few_x, few = thinned(x[inside], y[inside], max(MOST_POINTS // count, 40))
+        gap = [np.nan] * (number < count - 1)
+        xs.append(np.concatenate([few_x, gap]))
+        ys.append(np.concatenate([few, gap]))
+    return np.concatenate(xs), np.concatenate(ys)
 
 
 def residual_against_signals(comparison: Comparison) -> Figure:
@@ -191,7 +205,7 @@ def residual_on_loop(comparison: Comparison) -> Figure:
     chosen = some_rows(comparison.rows)
     x = scaled(drive, signal[chosen])
     for values, style, text in ((comparison.measured, MEASURED, 'measured'),
-                                (comparison.predicted, MODEL, comparison.name)):
+                                (comparison.predicted, MODEL, short_name(comparison.name))):
         line = {**style, 'linewidth': 0.9}
         for trial in np.unique(comparison.trial[chosen]):
             inside = comparison.trial[chosen] == trial

@@ -63,6 +63,24 @@ def verdict_in_words(found: Diagnosis) -> str:
             'own error.')
 
 
+def short_name(name: str) -> str:
+    """
+    Return a model's name with its effects counted where they are many.
+
+    Parameters
+    ----------
+    name : str
+        As in a comparison: `two-stage + creep + slack`, or `+ creep` for what an effect added.
+
+    Returns
+    -------
+    str
+        `two-stage + 2 effects`.
+    """
+    kind, *effects = name.split(' + ')
+    return f'{kind} + {len(effects)} effects' if kind and len(effects) > 1 else name
+
+
 def added_in_words(found: Diagnosis) -> str:
     """Return what was added for the error after it: of tied effects the first."""
     if any(found.alternatives):
