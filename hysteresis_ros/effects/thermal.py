@@ -93,7 +93,7 @@ class FirstOrderLag(ThermalEffect):
         if math.isfinite(phase):
             self._phase = phase
         self._q = (value + (q - value) * self._decay(value > q, dt)
-                   + float(self._released(before, phase, surroundings)))
+                   + float(self._released(before, phase, dt, surroundings)))
         return self._q
 
     @staticmethod
@@ -101,8 +101,9 @@ class FirstOrderLag(ThermalEffect):
         """Return q before a trial: 0, or the first one where that is a temperature."""
         return value if surroundings.drive == 'temperature' else 0.0
 
-    def _released(self, before: Values, phase: Values, surroundings: Surroundings) -> Values:
-        """Return what changing from the phase `before` adds to q."""
+    def _released(self, before: Values, phase: Values, dt: Values, surroundings: Surroundings
+                  ) -> Values:
+        """Return what changing from the phase `before` within `dt` [s] adds to q."""
         return 0.0 * np.nan_to_num(phase)
 
     def forward(self, signal: np.ndarray, inputs: Inputs, surroundings: Surroundings) -> Values:
@@ -110,7 +111,8 @@ class FirstOrderLag(ThermalEffect):
         self.start()
         times, phases = (np.ascontiguousarray(np.broadcast_to(column, np.shape(signal)), float)
                          for column in (inputs.dt, inputs.phase))
-        released = self._released(np.concatenate((phases[:1], phases[:-1])), phases, surroundings)
+        released = self._released(
+            np.concatenate((phases[:1], phases[:-1])), phases, times, surroundings)
         up, down = (min(self.rate(rising), FASTEST) for rising in (True, False))
         course = lag(np.ascontiguousarray(signal, float), times, up, down, released,
                      float(self._cold(signal[0], surroundings)))
@@ -187,9 +189,13 @@ class LatentHeat(FirstOrderLag):
         Parameter('latent', '1', 'h: latent heat over the heat stored at full drive', 0.05, 1.0,
                   0.0, (0.2, 0.5), log=True),)
 
-    def _released(self, before: Values, phase: Values, surroundings: Surroundings) -> Values:
+    def _released(self, before: Values, phase: Values, dt: Values, surroundings: Surroundings
+                  ) -> Values:
         """Return the latent heat in units of q; nothing where the phase is not known."""
-        return np.nan_to_num(self.latent * surroundings.full_drive_squared * (phase - before))
+        heat = np.nan_to_num(self.latent * surroundings.full_drive_squared * (phase - before))
+        # It comes evenly over the time and is lost to the air as all heat is.
+        lost = np.maximum(dt * min(self.rate(True), FASTEST), 1e-12)
+        return -np.expm1(-lost) / lost * heat
 
 
 class AmbientTemperature(ThermalEffect):

@@ -17,6 +17,7 @@ from hysteresis_ros.effects import Effect, Inputs
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
+from hysteresis_ros.model.stepper import Stepper
 from hysteresis_ros.operators import HysteresisOperator
 
 if TYPE_CHECKING:
@@ -26,10 +27,10 @@ if TYPE_CHECKING:
 # Rows of a settled table without times are this far apart [s] (Sec. III-A).
 HOLD = 30.0
 # Passes at most that bring an effect that depends on the phase into agreement with the phase it
-# causes, to this share of martensite, with steps of at least this part of the difference.
-PHASE_PASSES, AGREEMENT, SHORTEST = 10, 2e-3, 0.2
-# The same for an arm in motion, which has many more rows.
-MOVING_PASSES = 4
+# causes in each row, to this share of martensite, looking back at so many passes.
+PHASE_PASSES, AGREEMENT, LOOK_BACK = 16, 1e-5, 6
+# The same for an arm in motion, whose passes cost much more.
+MOVING_PASSES = 8
 # Balances that are kept, each with a table of some thousand numbers.
 MOST_BALANCES = 64
 
@@ -130,8 +131,8 @@ class Simulator:
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
 
-    def run(self, effects: Sequence[Effect],
-            inputs_of_stage: list[np.ndarray] | None = None) -> np.ndarray:
+    def run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None,
+            exact: bool = False) -> np.ndarray:
         """
         Simulate with these effects.
 
@@ -140,6 +141,9 @@ class Simulator:
         effects : sequence of Effect
         inputs_of_stage : list, optional
             Takes H2's inputs (rows,) for each trial of an arm run.
+        exact : bool
+            Whether an arm is followed row by row, which takes about fifty times as long, where the
+            phase does not come into agreement with all rows at once: strong latent heat.
 
         Returns
         -------
@@ -156,8 +160,10 @@ class Simulator:
         result = np.empty(self.measurement.rows)
         for trial in self.trials:
             if chain.needs_phase:
-                response = self._agree(
+                response, agrees = self._agree(
                     respond, trial, MOVING_PASSES if chain.moves else PHASE_PASSES)
+                if exact and not agrees and self.measurement.response == 'angle':
+                    response = self._row_by_row(chain, trial)
             else:
                 response = respond(trial, trial.inputs)
             result[trial.rows] = chain.measured(response.values, trial.inputs, response.rest)
@@ -193,20 +199,31 @@ class Simulator:
             rows = [self.run(effects) for effects in sets]
         return np.array(rows).reshape(len(sets), self.measurement.rows)
 
-    def _agree(self, respond: Callable, trial: Trial, passes: int) -> Response:
-        """Return the response with the phase that it has itself, by Aitken's relaxation."""
-        phase, residual, part = np.ones(len(trial.drive)), None, 1.0
+    def _agree(self, respond: Callable, trial: Trial, passes: int) -> tuple[Response, bool]:
+        """Return the response with the phase that it has itself, and whether that was found."""
+        phase = np.ones(len(trial.drive))
+        phases, residuals = [], []
         for _ in range(passes):
             response = respond(trial, trial.inputs._replace(phase=phase))
-            before, residual = residual, self._phase(response.output) - phase
-            if np.sqrt(np.mean(residual ** 2)) < AGREEMENT:
-                break
-            if before is not None:
-                change = residual - before
-                part *= -float(before @ change) / max(float(change @ change), 1e-300)
-                part = min(max(part, SHORTEST), 1.0)
-            phase = phase + part * residual
-        return response
+            residual = self._phase(response.output) - phase
+            if np.max(np.abs(residual), initial=0.0) < AGREEMENT:
+                return response, True
+            phases.append(phase)
+            residuals.append(residual)
+            phase = np.clip(_next_phase(phases[-LOOK_BACK:], residuals[-LOOK_BACK:]), 0.0, 1.0)
+        return response, False
+
+    def _row_by_row(self, chain: Chain, trial: Trial) -> Response:
+        """Return the response of an arm whose phase is found in each row before the next."""
+        balance = self._balance(chain)
+        arm = Stepper(self.model, chain, self.model.first_stage(chain), balance)
+        rest = arm.start()
+        columns = [np.broadcast_to(column, trial.drive.shape).tolist()
+                   for column in (trial.drive, *trial.inputs)]
+        rows = [(arm.step(drive, Inputs(*inputs)), balance.output, balance.operators[0].input)
+                for drive, *inputs in zip(*columns)]
+        angles, outputs, stage_inputs = np.array(rows, dtype=float).reshape(-1, 3).T
+        return Response(angles, outputs, stage_inputs, rest)
 
     def _phase(self, given: np.ndarray) -> np.ndarray:
         """Martensite share as the operator's output shows it."""
@@ -283,9 +300,19 @@ class Simulator:
         return Response(angles, outputs, stage_inputs, rest)
 
 
+def _next_phase(phases: Sequence[np.ndarray], residuals: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the phase to try after some with their residuals, by Anderson's acceleration."""
+    if len(phases) == 1:
+        # What works against its cause would swing to and fro.
+        return phases[0] + 0.5 * residuals[0]
+    steps, changes = np.diff(phases, axis=0).T, np.diff(residuals, axis=0).T
+    parts = np.linalg.lstsq(changes, residuals[-1], rcond=1e-10)[0]
+    return phases[-1] + residuals[-1] - (steps + changes) @ parts
+
+
 def predict(model: MuscleModel, measurement: Measurement) -> np.ndarray:
     """Simulate every row of a measurement with the model and its effects, shape (rows,)."""
-    return Simulator(model, measurement).run(model.effects)
+    return Simulator(model, measurement).run(model.effects, exact=True)
 
 
 def predict_linear(model: MuscleModel, measurement: Measurement) -> np.ndarray:
