@@ -76,10 +76,32 @@ class FirstOrderLag(ThermalEffect):
 
     # Without a chain the heat is exchanged as on the bench.
     speed = 1.0
+    # How much larger the heat capacity counts, where a controller takes latent heat for that.
+    slowing = 1.0
+
+    @property
+    def present(self) -> float:
+        """Drive squared that the muscle feels at present."""
+        return 0.0 if self._q is None else self._q
 
     def rate(self, rising: bool) -> float:
         """Return d1 [1/s] while q rises or falls, infinite without a lag."""
-        return self.speed / self.time_constant if self.time_constant > 0.0 else math.inf
+        if self.time_constant <= 0.0:
+            return math.inf
+        return self.speed / (self.slowing * self.time_constant)
+
+    def extremes(self, margin: float) -> list['FirstOrderLag']:
+        """
+        Return the same lag at both ends of what its time constant may be, the faster one first.
+
+        They are those of its interval, and at least a share `margin` from the value.
+        """
+        value = self.time_constant
+        low, high = self.intervals.get('time_constant', (value, value))
+        ends = min(low, (1.0 - margin) * value), max(high, (1.0 + margin) * value)
+        if value <= 0.0 or ends == (value, value):
+            return []
+        return [self.with_values(time_constant=max(end, 1e-3 * value)) for end in ends]
 
     def start(self) -> None:
         """Forget the past: q is that of the cold state."""
