@@ -11,7 +11,8 @@ import pytest
 
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ParameterError, RangeError
-from hysteresis_ros.model import Simulator
+from hysteresis_ros.model import MuscleModel, Simulator
+from hysteresis_ros.share import share_path
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY
 
 TARGETS = np.radians(np.random.default_rng(3).uniform(82.0, 106.0, 20)).tolist()
@@ -456,6 +457,84 @@ def test_a_dead_band_does_not_follow_small_reversals(names):
     assert back.error == pytest.approx(-5e-5, abs=1e-9)
     assert exact.setpoint(-0.010 + 5e-5, 6.0).voltage < last - 0.01
     assert calm.setpoint(-0.010 + 5e-4, 6.0).error == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('name', ['coulomb_friction', 'backlash'])
+def test_noise_of_a_target_does_not_swing_what_is_undone_by_direction(name):
+    rng = np.random.default_rng(1)
+    for start, drift in ((1.55, 0.0), (1.45, 2e-3)):
+        controller = bicep_model([name]).controller()
+        targets = start + drift * np.arange(80) + math.radians(0.01) * rng.uniform(-1.0, 1.0, 80)
+        volts = [controller.setpoint(*controller.reference(target)).voltage for target in targets]
+        assert np.max(np.abs(np.diff(volts[2:]))) < 0.1
+    # A turn by more is one.
+    back = controller.setpoint(*controller.reference(targets[-1] - 3e-3)).voltage
+    assert abs(back - volts[-1]) > 0.5
+    exact = bicep_model([name]).controller(angle_dead_band=0.0)
+    volts = [exact.setpoint(*exact.reference(target)).voltage
+             for target in (1.55, 1.5502, 1.55, 1.5502)]
+    assert np.max(np.abs(np.diff(volts))) > 0.5
+    with pytest.raises(ParameterError, match='angle_dead_band is -1'):
+        bicep_model([name]).controller(angle_dead_band=-1.0)
+
+
+@pytest.mark.parametrize('horizon', [math.inf, 2.0])
+def test_a_rate_limit_spreads_a_step_over_the_calls_that_follow(horizon):
+    model = bicep_model(['thermal_lag'])
+    free = model.controller(arm=True)
+    controller = model.controller(rate_limit=2.0, horizon=horizon)
+    time, volts = 0.0, [0.0]
+    for target in (1.5, 1.7):
+        reference = controller.reference(target)
+        volts.append(controller.setpoint(*reference, time).voltage)
+        for _ in range(80):
+            time += 0.25
+            volts.append(controller.hold(time))
+        assert volts[-1] == pytest.approx(free.setpoint(*reference).voltage, abs=1e-3)
+    assert np.max(np.abs(np.diff(volts))) == pytest.approx(0.5)
+    with pytest.raises(ParameterError, match='rate_limit is 0'):
+        controller.rate_limit = 0.0
+
+
+@pytest.mark.parametrize('name', ['supply_sag', 'unequal_muscles'])
+def test_what_is_reached_exactly_is_not_called_saturated(name):
+    """The package's model has plateaus, on which a drive beyond the limits gives the same."""
+    model = MuscleModel.load(share_path('config/bicep_model.yaml'))
+    model = model.with_effects([effect_of(model, name)])
+    rng = np.random.default_rng(0)
+    controller = model.controller()
+    controller.setpoint(-0.008, 3.0)
+    drives = np.clip(rng.uniform(-1.0, 7.0, 200), 0.0, 6.0)
+    for volts, force in zip(drives.tolist(), rng.uniform(1.0, 8.0, 200).tolist()):
+        length = controller._outcome(volts, force, force, controller._inputs(0.0, 0.5)).length
+        found = controller.setpoint(length, force)
+        assert abs(found.error) < 1e-9
+        assert not found.saturated and found.reason == ''
+
+
+def test_the_cold_arm_is_asked_for_the_angle_at_which_it_hangs():
+    model = bicep_model()
+    rest = model.observer().step(0.0, 0.0)
+    controller = model.controller()
+    found = controller.setpoint(*controller.reference(rest))
+    assert found.voltage == 0.0 and not found.saturated and abs(found.error) < 1e-8
+    assert controller.setpoint(*controller.reference(rest + 1e-3)).saturated
+
+
+@pytest.mark.parametrize('horizon', [math.inf, 2.0])
+def test_a_hold_takes_a_new_ambient_temperature(horizon):
+    model = bicep_model(['ambient_temperature', 'thermal_lag'])
+    controller = model.controller(horizon=horizon)
+    reference = controller.reference(1.6)
+    controller.setpoint(*reference, 0.0, ambient=24.0)
+    time = 0.0
+    for ambient in (24.0, 30.0, 21.0, math.nan):
+        for _ in range(300):
+            time += 0.1
+            volts = controller.hold(time, ambient)
+        fresh = model.controller(arm=True).setpoint(
+            *reference, ambient=ambient if math.isfinite(ambient) else 21.0)
+        assert volts == pytest.approx(fresh.voltage, abs=1e-3)
 
 
 def test_effects_that_cannot_be_undone_do_no_harm():

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 # Passes that bring a clipped drive into agreement with the phase that it causes.
 PHASE_PASSES = 20
+# A reference that is missed by less than this share of the range is reached: the tables of the arm
+# are about as exact.
+REACHED = 1e-6
 
 
 class Setpoint(NamedTuple):
@@ -92,8 +95,8 @@ class Controller:
         Largest change of the drive a second, where times are given; the rest of the way is done by
         the calls of `hold`. It must be positive.
     angle_dead_band : float
-        Targets that turn round by less than this [rad] do not turn the direction in which friction
-        and backlash are undone: noise would swing the drive by all of them.
+        Where friction or backlash is undone, targets that turn round by up to this [rad] are not
+        followed: noise would swing the drive by all that is undone.
 
     Raises
     ------
@@ -136,6 +139,8 @@ class Controller:
             self._inputs, horizon, rate_limit, latent * model.surroundings.full_drive_squared)
         if model.geometry is not None:
             self._targets = Targets(model.geometry, self._chain, lambda: self._at_rest()[0])
+        self.rate_limit = rate_limit
+        self.angle_dead_band = angle_dead_band
         self._rest: tuple[float, list[float]] | None = None
         self._arm = arm
         self.reset()
@@ -148,6 +153,21 @@ class Controller:
     @horizon.setter
     def horizon(self, value: float) -> None:
         self._pacing.horizon = value
+
+    @property
+    def angle_dead_band(self) -> float:
+        """Turn of the target [rad] up to which friction and backlash keep their direction."""
+        return self._angle_dead_band
+
+    @angle_dead_band.setter
+    def angle_dead_band(self, value: float) -> None:
+        if not 0.0 <= value < math.inf:
+            raise ParameterError(f'angle_dead_band is {value}; it has to be 0 or more')
+        self._angle_dead_band = value
+        for effect in self._chain.sensor:
+            effect.dead_band = value
+        if self.model.geometry is not None:
+            self._targets.dead_band = value
 
     @property
     def rate_limit(self) -> float:
@@ -297,7 +317,8 @@ class Controller:
         expected = self._force.step(applied) if commit else self._force.peek(applied)
         if commit:
             self._pacing.apply(drive)
-        saturated = found.saturated or clipped
+        saturated = (found.saturated or clipped) and not (
+            abs(expected - force) <= REACHED * (high - low))
         reason = (f'force {force:.4g} N is outside {low:.4g} to {high:.4g} N or beyond the drive '
                   'limits' if saturated else '')
         return Setpoint(drive, saturated, expected, expected - force, reason)
@@ -357,6 +378,9 @@ class Controller:
             for _ in range(PHASE_PASSES):
                 inputs = inputs._replace(phase=self._share(outcome.length, force))
                 outcome = self._outcome(drive, force, load, inputs)
+        # At the ends of the drive a plateau, or rounding, may give just what was asked for.
+        saturated = saturated and not (
+            abs(outcome.length - length) <= REACHED * self._chain.surroundings.span)
         applied = self._commit(drive, outcome, inputs, time)
         reason = ''
         if saturated:
