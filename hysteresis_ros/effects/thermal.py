@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.base import Effect, Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.stages import DriveEffect
 from hysteresis_ros.kernels.lag import lag
 
@@ -90,7 +90,7 @@ class FirstOrderLag(ThermalEffect):
             return math.inf
         return self.speed / (self.slowing * self.time_constant)
 
-    def extremes(self, margin: float) -> list['FirstOrderLag']:
+    def extremes(self, margin: float) -> list[Effect]:
         """
         Return the same lag at both ends of what its time constant may be, the faster one first.
 

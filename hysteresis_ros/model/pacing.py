@@ -98,8 +98,8 @@ class Pacing:
                    *(value for entry in begun for value in entry)]
         if not all(math.isfinite(value) for value in numbers):
             raise ValueError('a number of the pacing is not finite')
-        for chain, entry in zip(self._chains[1:], lags, strict=True):
-            chain.restore(entry)
+        for chain, memory in zip(self._chains[1:], lags, strict=True):
+            chain.restore(memory)
         self.drive, self._steady, self.travel = drive, steady, travel
         self._time, self._applied = time, applied
         self._period, self._deadline = period, deadline

@@ -50,7 +50,8 @@ COMPENSATION = (
     Spec('horizon', 5.0, 'Time in which a muscle that the model knows to lag is to reach its '
          'temperature; it is overdriven meanwhile, within the limits. 0 for never overdriven, as '
          'without republish_period', 's', 0.0, 600.0),
-    Spec('lag_margin', 0.3, "Share by which the muscle's time constant may differ from the model's; "
+    Spec('lag_margin', 0.3, "Share by which the muscle's time constant may differ from the "
+         "model's; "
          'the larger, the later it comes, and the less can it go too far',
          '', 0.0, 0.9, read_only=True),
     Spec('feedback', False, 'Whether the measured angle corrects the setpoint slowly',

@@ -120,9 +120,9 @@ ANGLE_LIMITS = (
 )
 
 TARGETS = (
-    Spec('target_dead_band', 0.001, 'Turn of the target angle up to which it is not followed, where '
-         'friction or backlash of the model is undone, because noise would swing the setpoint by '
-         'all of them', 'rad', 0.0, 0.1),
+    Spec('target_dead_band', 0.001, 'Turns of the target angle up to this are not followed, where '
+         'friction or backlash of the model is undone: noise would swing the setpoint by all that '
+         'is undone', 'rad', 0.0, 0.1),
 )
 
 VOLTAGE_LIMITS = (

@@ -88,7 +88,8 @@ class Cascade:
         -------
         Inversion
             The drive, the output that it gives, and whether that is not what was asked for because
-            a stage cannot give as much. If a number is not finite the present drive, flagged as saturated.
+            a stage cannot give as much. If a number is not finite the present drive, flagged as
+            saturated.
 
         """
         if not all(map(math.isfinite, (y, *coupled))):
