@@ -277,6 +277,18 @@ def test_repeats_come_within_the_horizon():
         compensator_node._check({**values, 'horizon': 0.4, 'republish_period': 0.5})
 
 
+def test_a_rate_limit_is_kept_and_the_repeats_do_the_rest_of_the_way(graph):
+    muscle = Muscle(graph, rate_limit=20.0, republish_period=0.02)
+    muscle.ask(1.75)
+    steady = offline([1.75])[0]
+    graph.until(lambda: muscle.voltages and muscle.voltages[-1] == pytest.approx(steady),
+                'the whole voltage')
+    assert muscle.voltages[0] == 0.0 < muscle.voltages[1] < 0.5 * steady
+    values = {spec.name: spec.default for spec in CompensatorNode.PARAMETERS}
+    with pytest.raises(ParameterError, match='rate_limit needs the repeats'):
+        compensator_node._check({**values, 'rate_limit': 1.0, 'republish_period': 0.0})
+
+
 class Arm:
     """A virtual arm in joint_states: the model's own prediction, with another payload."""
 

@@ -11,7 +11,8 @@ import pytest
 
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ParameterError, RangeError
-from hysteresis_ros.model import Simulator
+from hysteresis_ros.model import MuscleModel, Simulator
+from hysteresis_ros.share import share_path
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY
 
 TARGETS = np.radians(np.random.default_rng(3).uniform(82.0, 106.0, 20)).tolist()
@@ -92,7 +93,8 @@ def test_without_the_inverse_of_an_effect_the_arm_is_off():
 @pytest.mark.parametrize('horizon', [1.0, 2.3, 6.0])
 def test_overdriven_muscle_arrives_at_the_horizon_unless_limited(names, horizon):
     model = bicep_model(names)
-    controller, observer = model.controller(horizon=horizon), model.observer()
+    controller = model.controller(horizon=horizon, lag_margin=0.0)
+    observer = model.observer()
     observer.reset(0.0)
     time, arrivals = 0.0, 0
     for target in TARGETS:
@@ -111,17 +113,92 @@ def test_overdriven_muscle_arrives_at_the_horizon_unless_limited(names, horizon)
     assert arrivals >= 1
 
 
-def test_a_muscle_is_overdriven_evenly_and_no_more_than_the_horizon_asks():
+def test_a_muscle_is_overdriven_early_in_the_horizon_once_the_pace_of_the_calls_is_known():
     model = bicep_model(['thermal_lag'])
-    controller = model.controller(horizon=5.0)
+    controller = model.controller(
+        horizon=5.0, lag_margin=0.0, voltage_limits=(0.0, 12.0))
     reference = controller.reference(1.6)
-    voltage = controller.setpoint(*reference, 10.0).voltage
+    first = controller.setpoint(*reference, 10.0).voltage
     steady = model.controller(arm=True).setpoint(*reference).voltage
     # V^2 = q + (q - q0) e / (1 - e) with e the share that remains after the horizon.
-    left = math.exp(-5.0 / 3.0)
-    assert voltage ** 2 == pytest.approx(steady ** 2 / (1.0 - left))
-    assert [controller.hold(10.0 + 0.5 * n) for n in range(1, 10)] == pytest.approx([voltage] * 9)
-    assert [controller.hold(15.0), controller.hold(15.5)] == pytest.approx([steady] * 2)
+    assert first ** 2 == pytest.approx(steady ** 2 / (1.0 - math.exp(-5.0 / 3.0)))
+    # After half a second the next second is to bring it there.
+    q = first ** 2 * (1.0 - math.exp(-0.5 / 3.0))
+    share = math.exp(-1.0 / 3.0)
+    early = math.sqrt(steady ** 2 + (steady ** 2 - q) * share / (1.0 - share))
+    assert [controller.hold(10.5), controller.hold(11.0)] == pytest.approx([early] * 2)
+    assert [controller.hold(11.5), controller.hold(12.0)] == pytest.approx([steady] * 2)
+
+
+def lagging(tau, ratio, hold=30.0, name='thermal_lag', more=None, **options):
+    """Return errors [deg] (targets, samples each 0.5 s) of an arm with `ratio` times the tau."""
+    plain, more = bicep_model(), more or {}
+    model, arm = (plain.with_effects([effect_of(plain, name, time_constant=value, **more)])
+                  for value in (tau, ratio * tau))
+    controller, observer = model.controller(**options), arm.observer()
+    observer.reset(0.0)
+    time, errors = 0.0, []
+    for target in TARGETS[:4]:
+        voltage = controller.setpoint(*controller.reference(target), time).voltage
+        for _ in range(int(2 * hold)):
+            time += 0.5
+            errors.append(math.degrees(observer.step(time, voltage) - target))
+            voltage = controller.hold(time)
+    return np.array(errors).reshape(4, -1)
+
+
+def rmse(errors):
+    return float(np.sqrt(np.mean(errors ** 2)))
+
+
+def settled_after(errors):
+    """Return the mean time [s] until less than 5 % of each step is left."""
+    steps = np.abs(np.diff(np.degrees(TARGETS[:4])))
+    return np.mean([np.max(np.nonzero(np.abs(row) > 0.05 * step)[0], initial=-1)
+                    for row, step in zip(errors[1:], steps)]) * 0.5
+
+
+@pytest.mark.parametrize('tau', [1.0, 3.0, 10.0])
+def test_overdriving_by_a_wrong_time_constant_is_never_worse_than_none(tau):
+    for ratio in (0.7, 0.85, 1.0, 1.3):
+        plain = lagging(tau, ratio)
+        errors = lagging(tau, ratio, horizon=5.0)
+        assert rmse(errors[:, :10]) < rmse(plain[:, :10])
+        assert rmse(errors[:, -10:]) <= rmse(plain[:, -10:]) + 1e-3
+
+
+@pytest.mark.parametrize('tau', [1.0, 3.0, 10.0])
+def test_overdriving_by_the_right_time_constant_is_twice_as_fast(tau):
+    """Of what a muscle lacks that is as far from the fastest as the margin says, less is left."""
+    plain = lagging(tau, 1.0, 5.0 * tau)
+    assert settled_after(lagging(tau, 1.0, 5.0 * tau, horizon=2.0, lag_margin=0.05)) < (
+        0.5 * settled_after(plain))
+    assert settled_after(lagging(tau, 1.0, 5.0 * tau, horizon=2.0)) < 0.85 * settled_after(plain)
+
+
+def test_an_interval_of_the_time_constant_counts_where_it_is_wider_than_the_margin():
+    model = bicep_model(['thermal_lag'])
+    drives = []
+    for interval in (None, (2.5, 3.5), (1.0, 9.0)):
+        if interval:
+            model.effects[0].intervals = {'time_constant': interval}
+        controller = model.controller(horizon=5.0)
+        drives.append(controller.setpoint(*controller.reference(1.6), 0.0).voltage)
+    assert drives[0] == drives[1] > drives[2]
+
+
+@pytest.mark.parametrize('latent', [0.5, 1.0])
+def test_latent_heat_is_brought_in_sooner_and_never_too_much(latent):
+    for ratio, margin, part in ((0.75, 0.3, 0.75), (1.0, 0.0, 0.4)):
+        plain, errors = (lagging(8.0, ratio, 25.0, 'latent_heat', {'latent': latent}, **options)
+                         for options in ({}, {'horizon': 5.0, 'lag_margin': margin}))
+        assert rmse(errors[:, -1]) < part * rmse(plain[:, -1])
+
+
+@pytest.mark.parametrize('margin', [-0.1, 1.0, math.nan])
+def test_a_margin_that_makes_no_sense_is_refused(margin):
+    with pytest.raises(ParameterError, match='lag_margin is'):
+        bicep_model().controller(lag_margin=margin)
 
 
 def test_overdriving_latent_heat_never_goes_too_far():
@@ -143,7 +220,8 @@ def test_overdriving_latent_heat_never_goes_too_far():
 
 def test_irregular_calls_do_not_make_an_overdriven_muscle_swing():
     model = bicep_model(['thermal_lag'])
-    controller, observer = model.controller(horizon=1.0), model.observer()
+    controller = model.controller(horizon=1.0, lag_margin=0.0)
+    observer = model.observer()
     observer.reset(0.0)
     target, time = 1.5, 0.0
     voltage = controller.setpoint(*controller.reference(target), time).voltage
@@ -379,6 +457,84 @@ def test_a_dead_band_does_not_follow_small_reversals(names):
     assert back.error == pytest.approx(-5e-5, abs=1e-9)
     assert exact.setpoint(-0.010 + 5e-5, 6.0).voltage < last - 0.01
     assert calm.setpoint(-0.010 + 5e-4, 6.0).error == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('name', ['coulomb_friction', 'backlash'])
+def test_noise_of_a_target_does_not_swing_what_is_undone_by_direction(name):
+    rng = np.random.default_rng(1)
+    for start, drift in ((1.55, 0.0), (1.45, 2e-3)):
+        controller = bicep_model([name]).controller()
+        targets = start + drift * np.arange(80) + math.radians(0.01) * rng.uniform(-1.0, 1.0, 80)
+        volts = [controller.setpoint(*controller.reference(target)).voltage for target in targets]
+        assert np.max(np.abs(np.diff(volts[2:]))) < 0.1
+    # A turn by more is one.
+    back = controller.setpoint(*controller.reference(targets[-1] - 3e-3)).voltage
+    assert abs(back - volts[-1]) > 0.5
+    exact = bicep_model([name]).controller(angle_dead_band=0.0)
+    volts = [exact.setpoint(*exact.reference(target)).voltage
+             for target in (1.55, 1.5502, 1.55, 1.5502)]
+    assert np.max(np.abs(np.diff(volts))) > 0.5
+    with pytest.raises(ParameterError, match='angle_dead_band is -1'):
+        bicep_model([name]).controller(angle_dead_band=-1.0)
+
+
+@pytest.mark.parametrize('horizon', [math.inf, 2.0])
+def test_a_rate_limit_spreads_a_step_over_the_calls_that_follow(horizon):
+    model = bicep_model(['thermal_lag'])
+    free = model.controller(arm=True)
+    controller = model.controller(rate_limit=2.0, horizon=horizon)
+    time, volts = 0.0, [0.0]
+    for target in (1.5, 1.7):
+        reference = controller.reference(target)
+        volts.append(controller.setpoint(*reference, time).voltage)
+        for _ in range(80):
+            time += 0.25
+            volts.append(controller.hold(time))
+        assert volts[-1] == pytest.approx(free.setpoint(*reference).voltage, abs=1e-3)
+    assert np.max(np.abs(np.diff(volts))) == pytest.approx(0.5)
+    with pytest.raises(ParameterError, match='rate_limit is 0'):
+        controller.rate_limit = 0.0
+
+
+@pytest.mark.parametrize('name', ['supply_sag', 'unequal_muscles'])
+def test_what_is_reached_exactly_is_not_called_saturated(name):
+    """The package's model has plateaus, on which a drive beyond the limits gives the same."""
+    model = MuscleModel.load(share_path('config/bicep_model.yaml'))
+    model = model.with_effects([effect_of(model, name)])
+    rng = np.random.default_rng(0)
+    controller = model.controller()
+    controller.setpoint(-0.008, 3.0)
+    drives = np.clip(rng.uniform(-1.0, 7.0, 200), 0.0, 6.0)
+    for volts, force in zip(drives.tolist(), rng.uniform(1.0, 8.0, 200).tolist()):
+        length = controller._outcome(volts, force, force, controller._inputs(0.0, 0.5)).length
+        found = controller.setpoint(length, force)
+        assert abs(found.error) < 1e-9
+        assert not found.saturated and found.reason == ''
+
+
+def test_the_cold_arm_is_asked_for_the_angle_at_which_it_hangs():
+    model = bicep_model()
+    rest = model.observer().step(0.0, 0.0)
+    controller = model.controller()
+    found = controller.setpoint(*controller.reference(rest))
+    assert found.voltage == 0.0 and not found.saturated and abs(found.error) < 1e-8
+    assert controller.setpoint(*controller.reference(rest + 1e-3)).saturated
+
+
+@pytest.mark.parametrize('horizon', [math.inf, 2.0])
+def test_a_hold_takes_a_new_ambient_temperature(horizon):
+    model = bicep_model(['ambient_temperature', 'thermal_lag'])
+    controller = model.controller(horizon=horizon)
+    reference = controller.reference(1.6)
+    controller.setpoint(*reference, 0.0, ambient=24.0)
+    time = 0.0
+    for ambient in (24.0, 30.0, 21.0, math.nan):
+        for _ in range(300):
+            time += 0.1
+            volts = controller.hold(time, ambient)
+        fresh = model.controller(arm=True).setpoint(
+            *reference, ambient=ambient if math.isfinite(ambient) else 21.0)
+        assert volts == pytest.approx(fresh.voltage, abs=1e-3)
 
 
 def test_effects_that_cannot_be_undone_do_no_harm():

@@ -144,7 +144,7 @@ def test_a_strong_effect_of_the_phase_agrees_with_the_phase_it_causes(monkeypatc
 
 @pytest.mark.parametrize('jobs', [1, 2])
 def test_a_run_after_another_needs_fewer_passes_and_gives_the_same(monkeypatch, jobs):
-    """It begins with the phase of the run before, unless that failed."""
+    """It begins with the phase of the run before, even if that failed."""
     model = bicep_model()
     effects = [[effect_of(model, 'resistance_change', eta=eta)] for eta in (0.2, 0.19)]
     given = outputs_given(monkeypatch)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
@@ -101,6 +101,18 @@ class ArmBalance:
         other.operators, memories = with_own_memories(self.operators)
         other._state = State(memories, self._state.motion.copy(), self._state.inputs.copy())
         return other
+
+    def snapshot(self) -> tuple[list[Any], np.ndarray, np.ndarray]:
+        """Return the state for `rewind`."""
+        return ([operator.snapshot() for operator in self.operators],
+                self._state.motion.copy(), self._state.inputs.copy())
+
+    def rewind(self, snapshot: tuple[list[Any], np.ndarray, np.ndarray]) -> None:
+        """Go back to a state that `snapshot` returned."""
+        memories, motion, inputs = snapshot
+        for operator, memory in zip(self.operators, memories):
+            operator.rewind(memory)
+        self._state.motion[:], self._state.inputs[:] = motion, inputs
 
     def start(self) -> None:
         """Wipe the memory: after a full heat and cool cycle, before the first sample."""

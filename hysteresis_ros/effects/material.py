@@ -326,10 +326,10 @@ class Creep(MaterialEffect):
 
 
 class Fatigue(MaterialEffect):
-    """Cycle after cycle the muscle gets longer, or its stroke shorter."""
+    """Cycle after cycle the muscle gets shorter, or longer, and loses stroke."""
 
     id = 'fatigue'
-    sentence = 'With every cycle the muscle drifts and its stroke shrinks.'
+    sentence = 'With every cycle the muscle gets a little shorter, or longer, and loses stroke.'
     equation = 'L -= b l0 ln(1 + N), stroke times (1 - a ln(1 + N)), N the number of cycles'
     source = 'functional fatigue of shape memory alloys'
     shows_in = 'cycle count'
@@ -337,7 +337,8 @@ class Fatigue(MaterialEffect):
     confused_with = ('ambient_drift',)
     kinds = ('arm', 'bench')
     parameters = (
-        Parameter('b', '% of l0', 'drift per factor e of the number of cycles', 0.0, 0.5, 0.0,
+        Parameter('b', '% of l0', 'drift per factor e of the number of cycles, positive where '
+                  'the muscle gets shorter', 0.0, 0.5, 0.0,
                   (0.05, -0.05), both_signs=True),
         Parameter('a', '1', 'loss of stroke per factor e of the number of cycles', 0.0, 0.3, 0.0,
                   (0.03,)),

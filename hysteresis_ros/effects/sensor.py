@@ -82,10 +82,14 @@ class Backlash(SensorEffect):
 
     def inverse(self, response: float) -> float:
         """Go further by half the play in the direction of the motion."""
-        if self._target is not None and response != self._target:
-            self._lead = math.copysign(0.5 * math.radians(self.B), response - self._target)
-        self._target = response
-        return response + self._lead
+        way = 0.0 if self._target is None else response - self._target
+        if way * self._lead > 0.0 or abs(way) > self.dead_band:
+            self._lead = math.copysign(0.5 * math.radians(self.B), way)
+            self._target = response
+        elif self._target is None:
+            self._target = response
+        # Not a turn yet: the furthest target goes on to count.
+        return self._target + self._lead
 
 
 class Latency(SensorEffect):

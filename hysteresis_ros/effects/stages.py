@@ -188,6 +188,8 @@ class SensorEffect(Effect):
 
     stage = 'sensor'
     kinds: ClassVar[tuple[str, ...]] = ('arm', 'bench')
+    # A turn of the wanted response up to this does not turn what the inverse adds by direction.
+    dead_band: float = 0.0
 
     def begin(self, rest: float) -> None:
         """Take up the true response of the state of rest before a trial, after `start`."""

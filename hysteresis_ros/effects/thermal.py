@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.base import Effect, Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.stages import DriveEffect
 from hysteresis_ros.kernels.lag import lag
 
@@ -76,10 +76,32 @@ class FirstOrderLag(ThermalEffect):
 
     # Without a chain the heat is exchanged as on the bench.
     speed = 1.0
+    # How much larger the heat capacity counts, where a controller takes latent heat for that.
+    slowing = 1.0
+
+    @property
+    def present(self) -> float:
+        """Drive squared that the muscle feels at present."""
+        return 0.0 if self._q is None else self._q
 
     def rate(self, rising: bool) -> float:
         """Return d1 [1/s] while q rises or falls, infinite without a lag."""
-        return self.speed / self.time_constant if self.time_constant > 0.0 else math.inf
+        if self.time_constant <= 0.0:
+            return math.inf
+        return self.speed / (self.slowing * self.time_constant)
+
+    def extremes(self, margin: float) -> list[Effect]:
+        """
+        Return the same lag at both ends of what its time constant may be, the faster one first.
+
+        They are those of its interval, and at least a share `margin` from the value.
+        """
+        value = self.time_constant
+        low, high = self.intervals.get('time_constant', (value, value))
+        ends = min(low, (1.0 - margin) * value), max(high, (1.0 + margin) * value)
+        if value <= 0.0 or ends == (value, value):
+            return []
+        return [self.with_values(time_constant=max(end, 1e-3 * value)) for end in ends]
 
     def start(self) -> None:
         """Forget the past: q is that of the cold state."""
@@ -93,7 +115,7 @@ class FirstOrderLag(ThermalEffect):
         if math.isfinite(phase):
             self._phase = phase
         self._q = (value + (q - value) * self._decay(value > q, dt)
-                   + float(self._released(before, phase, surroundings)))
+                   + float(self._released(before, phase, dt, surroundings)))
         return self._q
 
     @staticmethod
@@ -101,8 +123,9 @@ class FirstOrderLag(ThermalEffect):
         """Return q before a trial: 0, or the first one where that is a temperature."""
         return value if surroundings.drive == 'temperature' else 0.0
 
-    def _released(self, before: Values, phase: Values, surroundings: Surroundings) -> Values:
-        """Return what changing from the phase `before` adds to q."""
+    def _released(self, before: Values, phase: Values, dt: Values, surroundings: Surroundings
+                  ) -> Values:
+        """Return what changing from the phase `before` within `dt` [s] adds to q."""
         return 0.0 * np.nan_to_num(phase)
 
     def forward(self, signal: np.ndarray, inputs: Inputs, surroundings: Surroundings) -> Values:
@@ -110,7 +133,8 @@ class FirstOrderLag(ThermalEffect):
         self.start()
         times, phases = (np.ascontiguousarray(np.broadcast_to(column, np.shape(signal)), float)
                          for column in (inputs.dt, inputs.phase))
-        released = self._released(np.concatenate((phases[:1], phases[:-1])), phases, surroundings)
+        released = self._released(
+            np.concatenate((phases[:1], phases[:-1])), phases, times, surroundings)
         up, down = (min(self.rate(rising), FASTEST) for rising in (True, False))
         course = lag(np.ascontiguousarray(signal, float), times, up, down, released,
                      float(self._cold(signal[0], surroundings)))
@@ -187,9 +211,13 @@ class LatentHeat(FirstOrderLag):
         Parameter('latent', '1', 'h: latent heat over the heat stored at full drive', 0.05, 1.0,
                   0.0, (0.2, 0.5), log=True),)
 
-    def _released(self, before: Values, phase: Values, surroundings: Surroundings) -> Values:
+    def _released(self, before: Values, phase: Values, dt: Values, surroundings: Surroundings
+                  ) -> Values:
         """Return the latent heat in units of q; nothing where the phase is not known."""
-        return np.nan_to_num(self.latent * surroundings.full_drive_squared * (phase - before))
+        heat = np.nan_to_num(self.latent * surroundings.full_drive_squared * (phase - before))
+        # It comes evenly over the time and is lost to the air as all heat is.
+        lost = np.maximum(dt * min(self.rate(True), FASTEST), 1e-12)
+        return -np.expm1(-lost) / lost * heat
 
 
 class AmbientTemperature(ThermalEffect):

@@ -152,6 +152,14 @@ class Chain:
             signal = effect.inverse(signal, inputs, self.surroundings)
         return float(signal)
 
+    def at_thermal(self, drive_squared: float, last: DriveEffect, inputs: Inputs) -> float:
+        """Return what a thermal effect gives where the muscle feels a drive squared."""
+        for effect in reversed(self.thermal):
+            if effect is last:
+                break
+            drive_squared = effect.inverse(drive_squared, inputs, self.surroundings)
+        return drive_squared
+
     def load_per_drive_squared(self) -> float:
         """Return C of `stress_dependence`, or 0 where the first stage is the model's own."""
         return sum(effect.load_per_drive_squared for effect in self.material)

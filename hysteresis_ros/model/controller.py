@@ -13,7 +13,7 @@ import numpy as np
 
 from hysteresis_ros.bicep.geometry import Reference
 from hysteresis_ros.effects import Inputs
-from hysteresis_ros.effects.thermal import LatentHeat
+from hysteresis_ros.effects.thermal import FirstOrderLag, LatentHeat
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.pacing import Pacing
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 # Passes that bring a clipped drive into agreement with the phase that it causes.
 PHASE_PASSES = 20
+# A reference that is missed by less than this share of the range is reached: the tables of the arm
+# are about as exact.
+REACHED = 1e-6
 
 
 class Setpoint(NamedTuple):
@@ -79,15 +82,26 @@ class Controller:
         inverse amplifies noise without bound.
     horizon : float
         Time [s] within which a lagging muscle is to reach its temperature; it is overdriven
-        meanwhile, within the limits. Call `hold` at least this often. Infinite: never overdriven.
+        meanwhile, within the limits, and most in the first part of that time. Call `hold` evenly,
+        the more often the better, and at least once within it. Infinite: never overdriven.
     arm : bool
         Whether the muscle lifts the model's arm, whose load it bears while it is cold. Else it
         bears the first reference's force, as on the bench. Calling `reference` says so, too.
+    lag_margin : float
+        Share, 0 to less than 1, by which the muscle's time constant may differ from the model's,
+        if its interval does not say more. Nothing inside is overdriven beyond its temperature; what
+        is slower than the fastest then comes later. 0: the model's own muscle arrives exactly.
+    rate_limit : float
+        Largest change of the drive a second, where times are given; the rest of the way is done by
+        the calls of `hold`. It must be positive.
+    angle_dead_band : float
+        Where friction or backlash is undone, targets that turn round by up to this [rad] are not
+        followed: noise would swing the drive by all that is undone.
 
     Raises
     ------
     ParameterError
-        If the limits make no sense.
+        If the limits make no sense, or one of the last three does not.
     """
 
     # Only of a model with a length stage, and of one with an arm.
@@ -95,16 +109,21 @@ class Controller:
     _targets: Targets
 
     def __init__(self, model: MuscleModel, voltage_limits: tuple[float, float] | None = None,
-                 dead_band: float = 0.0, horizon: float = math.inf, arm: bool = False) -> None:
+                 dead_band: float = 0.0, horizon: float = math.inf, arm: bool = False,
+                 lag_margin: float = 0.3, rate_limit: float = math.inf,
+                 angle_dead_band: float = 1e-3) -> None:
         self.model = model
         self.limits = tuple(voltage_limits or model.ranges.get(model.drive, (0.0, math.inf)))
         if not self.limits[0] < self.limits[1]:
             raise ParameterError(f'the drive limits {self.limits} have to be a lower and an upper')
+        if not 0.0 <= lag_margin < 1.0:
+            raise ParameterError(f'lag_margin is {lag_margin}; it has to be from 0 to below 1')
         self.dead_band = dead_band
         usable = [effect for effect in model.effects
                   if effect.invertible or effect.stage in ('mechanism', 'sensor')]
-        # What the transformation takes up on the way is not foreseen: overdriven as by a mere lag,
-        # the muscle comes later, but never too far.
+        # What the transformation takes up on the way is known only when it is over: the lag counts
+        # as a longer one meanwhile.
+        latent = sum(effect.latent for effect in usable if isinstance(effect, LatentHeat))
         usable = [effect.with_values(latent=0.0) if isinstance(effect, LatentHeat) else effect
                   for effect in usable]
         self._chain = Chain(usable, model.surroundings)
@@ -115,9 +134,13 @@ class Controller:
         if model.length_stage is not None:
             self._second = SecondStage(model.require_length_stage(), model.sign,
                                        self._chain.offsets, self._chain.compliance())
-        self._pacing = Pacing(self._chain, self._clip, self._inputs, horizon)
+        self._pacing = Pacing(
+            [self._chain, *_with_other_lags(model, self._chain, lag_margin)], self._clip,
+            self._inputs, horizon, rate_limit, latent * model.surroundings.full_drive_squared)
         if model.geometry is not None:
             self._targets = Targets(model.geometry, self._chain, lambda: self._at_rest()[0])
+        self.rate_limit = rate_limit
+        self.angle_dead_band = angle_dead_band
         self._rest: tuple[float, list[float]] | None = None
         self._arm = arm
         self.reset()
@@ -130,6 +153,32 @@ class Controller:
     @horizon.setter
     def horizon(self, value: float) -> None:
         self._pacing.horizon = value
+
+    @property
+    def angle_dead_band(self) -> float:
+        """Turn of the target [rad] up to which friction and backlash keep their direction."""
+        return self._angle_dead_band
+
+    @angle_dead_band.setter
+    def angle_dead_band(self, value: float) -> None:
+        if not 0.0 <= value < math.inf:
+            raise ParameterError(f'angle_dead_band is {value}; it has to be 0 or more')
+        self._angle_dead_band = value
+        for effect in self._chain.sensor:
+            effect.dead_band = value
+        if self.model.geometry is not None:
+            self._targets.dead_band = value
+
+    @property
+    def rate_limit(self) -> float:
+        """Largest change of the drive a second."""
+        return self._pacing.rate_limit
+
+    @rate_limit.setter
+    def rate_limit(self, value: float) -> None:
+        if not value > 0.0:
+            raise ParameterError(f'rate_limit is {value}; it has to be positive')
+        self._pacing.rate_limit = value
 
     def reset(self) -> None:
         """Forget the history: the muscle was heated and cooled. What has worn it stays."""
@@ -171,7 +220,7 @@ class Controller:
         """
         before = self.save()
         try:
-            for part in (state['targets'], state['pacing'], {'ambient': state['ambient']}):
+            for part in (state['targets'], {'ambient': state['ambient']}):
                 for name, value in part.items():
                     if value is not None and not math.isfinite(value):
                         raise ValueError(f'{name} is {value}')
@@ -268,7 +317,8 @@ class Controller:
         expected = self._force.step(applied) if commit else self._force.peek(applied)
         if commit:
             self._pacing.apply(drive)
-        saturated = found.saturated or clipped
+        saturated = (found.saturated or clipped) and not (
+            abs(expected - force) <= REACHED * (high - low))
         reason = (f'force {force:.4g} N is outside {low:.4g} to {high:.4g} N or beyond the drive '
                   'limits' if saturated else '')
         return Setpoint(drive, saturated, expected, expected - force, reason)
@@ -319,6 +369,7 @@ class Controller:
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
             self._second.settle_cold(self._cold, load, self._at_rest()[1] if self._arm else None)
+            self._pacing.rest(float(self.model.martensite(self._second.output)))
         inputs = self._inputs(0.0, self._share(length, force), ambient)
         find = self._search if self._steady.drifts else self._invert
         drive, saturated = find(length, force, load, inputs)
@@ -327,6 +378,9 @@ class Controller:
             for _ in range(PHASE_PASSES):
                 inputs = inputs._replace(phase=self._share(outcome.length, force))
                 outcome = self._outcome(drive, force, load, inputs)
+        # At the ends of the drive a plateau, or rounding, may give just what was asked for.
+        saturated = saturated and not (
+            abs(outcome.length - length) <= REACHED * self._chain.surroundings.span)
         applied = self._commit(drive, outcome, inputs, time)
         reason = ''
         if saturated:
@@ -401,22 +455,30 @@ class Controller:
         self._pacing.begin(drive, outcome.drive_squared, inputs.phase, time)
         return self._pacing.drive
 
-    def hold(self, time: float) -> float:
+    def hold(self, time: float, ambient: float = math.nan) -> float:
         """
         Return the drive that keeps the last reference, without touching its memory.
 
         It differs from the last setpoint's only while a lagging muscle is being overdriven, which
-        ends with the first call at the horizon or after it.
+        ends with the first call at the horizon or after it; on the way that the rate limit makes
+        longer; and where the ambient temperature has changed.
 
         Parameters
         ----------
         time : float
             Now [s].
+        ambient : float
+            Ambient temperature [degC], NaN if unknown: then that of before counts.
         """
         if self._fresh:
             self._pacing.advance(time)
-        else:
-            self._pacing.hold(time)
+            return self._pacing.drive
+        steady = None
+        if math.isfinite(ambient) and ambient != self._ambient:
+            self._ambient = ambient
+            steady = self._clip(self._steady.inverse(
+                self._pacing.drive_squared, self._inputs(0.0, self._pacing.phase)))[0]
+        self._pacing.hold(time, steady)
         return self._pacing.drive
 
     def _inputs(self, dt: float, phase: float, ambient: float = math.nan) -> Inputs:
@@ -440,3 +502,13 @@ class Controller:
         margin = 1e-9 * max(abs(low), abs(high)) if math.isfinite(high) else 0.0
         clipped = min(max(drive, low), high)
         return clipped, abs(clipped - drive) > margin
+
+
+def _with_other_lags(model: MuscleModel, chain: Chain, margin: float) -> list[Chain]:
+    """Return the effects of a chain with the fastest and the slowest lag that they may have."""
+    effects = chain.thermal
+    lags = [effect for effect in effects if isinstance(effect, FirstOrderLag)]
+    if not lags:
+        return []
+    others = [*chain.electrical, *(effect for effect in effects if effect is not lags[0])]
+    return [Chain([*others, lag], model.surroundings) for lag in lags[0].extremes(margin)]

@@ -8,6 +8,7 @@ import math
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.effects import Inputs
+from hysteresis_ros.model.stepper import Stepper
 
 if TYPE_CHECKING:
     from hysteresis_ros.model.muscle import MuscleModel
@@ -20,8 +21,8 @@ class Observer:
     """
     Predict the measured angle from the applied drive.
 
-    It gives what `Simulator` gives for the same samples, but for effects that depend on the phase:
-    those take the phase of the sample before.
+    It gives what `Simulator` gives for the same samples. Effects that depend on the phase take the
+    one that each sample ends with, which is found within the sample.
 
     Parameters
     ----------
@@ -39,8 +40,8 @@ class Observer:
     def __init__(self, model: MuscleModel) -> None:
         self.model = model
         self._chain = model.chain()
-        self._first = model.first_stage(self._chain)
-        self._balance = model.balance(self._chain)
+        self._arm = Stepper(
+            model, self._chain, model.first_stage(self._chain), model.balance(self._chain))
         self._travel = 0.0
         self.reset()
 
@@ -53,16 +54,11 @@ class Observer:
         time : float, optional
             When it begins [s]; by default with the first sample.
         """
-        cold = self.model.cold_drive
-        self._chain.start()
-        self._first.reset()
-        self._balance.start()
-        rest = self._balance.settle(self._first.step(float(self._chain.to_drive_squared(cold))))
+        rest = self._arm.start()
         for effect in self._chain.sensor:
             effect.begin(rest)
         self._time = time
-        self._drive = cold
-        self._phase = 1.0
+        self._drive = self.model.cold_drive
 
     def step(self, time: float, drive: float, ambient: float = math.nan) -> float:
         """
@@ -91,13 +87,9 @@ class Observer:
         dt = time - before
         self._travel += abs(drive - self._drive)
         self._time, self._drive = time, drive
-        inputs = Inputs(time, time, dt, ambient, self._phase,
+        inputs = Inputs(time, time, dt, ambient, math.nan,
                         self._travel / (2.0 * self.model.drive_range))
-        drive_squared = self._chain.step(drive, inputs)
-        offset, factor = self._chain.advance(drive, drive_squared, inputs)
-        angle = self._balance.step(self._first.step(drive_squared), dt, offset, factor)
-        if self._chain.needs_phase:
-            self._phase = float(self.model.martensite(self._balance.output))
+        angle = self._arm.step(drive, inputs)
         for effect in self._chain.sensor:
             angle = effect.step(angle, dt)
         return angle

@@ -72,6 +72,12 @@ class SecondStage:
         self.reset()
         self.step(self.respond(x, load)[1] if inputs is None else inputs)
 
+    @property
+    def output(self) -> float:
+        """What the transformation gives [m]; the mean of the muscles."""
+        outputs = [operator.output for operator in self._operators]
+        return sum(outputs) / len(outputs)
+
     def drive(self, output: float, load: float, dead_band: float = 0.0) -> tuple[float, bool]:
         """Return x for an output [m] under a load, and whether that output is out of reach."""
         if self._bundle is not None:

@@ -17,6 +17,7 @@ from hysteresis_ros.effects import Effect, Inputs
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
+from hysteresis_ros.model.stepper import Stepper
 from hysteresis_ros.operators import HysteresisOperator
 
 if TYPE_CHECKING:
@@ -25,11 +26,12 @@ if TYPE_CHECKING:
 
 # Rows of a settled table without times are this far apart [s] (Sec. III-A).
 HOLD = 30.0
-# Passes at most that bring an effect that depends on the phase into agreement with the phase it
-# causes, to this share of martensite, with steps of at least this part of the difference.
-PHASE_PASSES, AGREEMENT, SHORTEST = 10, 2e-3, 0.2
-# The same for an arm in motion, which has many more rows.
-MOVING_PASSES = 4
+# Effects that depend on the phase are brought into agreement with the phase that they cause in each
+# row, to this share of martensite (rms), in so many passes at most, each looking back at some. An
+# arm in motion has many more rows.
+AGREEMENT, PASSES, MOVING_PASSES, LOOK_BACK = 1e-6, 16, 8, 6
+# Fits compare thousands of sets of effects, and are content with less.
+FIT_AGREEMENT, FIT_PASSES, MOVING_FIT_PASSES = 2e-3, 10, 4
 # Balances that are kept, each with a table of some thousand numbers.
 MOST_BALANCES = 64
 
@@ -132,8 +134,8 @@ class Simulator:
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
 
-    def run(self, effects: Sequence[Effect],
-            inputs_of_stage: list[np.ndarray] | None = None) -> np.ndarray:
+    def run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None,
+            exact: bool = False) -> np.ndarray:
         """
         Simulate with these effects.
 
@@ -142,6 +144,9 @@ class Simulator:
         effects : sequence of Effect
         inputs_of_stage : list, optional
             Takes H2's inputs (rows,) for each trial of an arm run.
+        exact : bool
+            Whether an arm is followed row by row, which takes about fifty times as long, where the
+            phase does not come into agreement with all rows at once: strong latent heat.
 
         Returns
         -------
@@ -153,16 +158,16 @@ class Simulator:
         ParameterError, ModelFileError
             If the model lacks what this kind of measurement needs.
         """
-        response, phase = self._run(effects, inputs_of_stage)
+        response, phase = self._run(effects, inputs_of_stage, exact)
         self._keep(effects, phase)
         return response
 
     def _keep(self, effects: Sequence[Effect], phase: np.ndarray | None) -> None:
-        if phase is not None and np.all(np.isfinite(phase)):
+        if phase is not None:
             self._phases[tuple(effect.id for effect in effects)] = phase
 
-    def _run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None
-             ) -> tuple[np.ndarray, np.ndarray | None]:
+    def _run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None,
+             exact: bool = False) -> tuple[np.ndarray, np.ndarray | None]:
         """Return the response, and the martensite share where effects need it, each (rows,)."""
         chain = Chain(effects, self._surroundings)
         respond = self._responder(chain)
@@ -170,12 +175,14 @@ class Simulator:
         phase = None
         if chain.needs_phase:
             known = self._phases.get(tuple(effect.id for effect in effects))
-            phase = np.ones(self.measurement.rows) if known is None else known.copy()
+            phase = (np.ones(self.measurement.rows) if exact or known is None
+                     else known.copy())
         for trial in self.trials:
             if phase is not None:
-                response, phase[trial.rows] = self._agree(
-                    respond, trial, MOVING_PASSES if chain.moves else PHASE_PASSES,
-                    phase[trial.rows])
+                response, phase[trial.rows], agrees = self._agree(
+                    respond, trial, phase[trial.rows], *self._patience(chain.moves, exact))
+                if exact and not agrees and self.measurement.response == 'angle':
+                    response = self._row_by_row(chain, trial)
             else:
                 response = respond(trial, trial.inputs)
             result[trial.rows] = chain.measured(response.values, trial.inputs, response.rest)
@@ -214,26 +221,46 @@ class Simulator:
             self._keep(effects, phase)
         return np.array([row for row, _ in found]).reshape(len(sets), self.measurement.rows)
 
-    def _agree(self, respond: Callable, trial: Trial, passes: int, phase: np.ndarray
-               ) -> tuple[Response, np.ndarray]:
-        """
-        Return the response with the phase that it has itself, and this phase (rows,).
+    @staticmethod
+    def _patience(moves: bool, exact: bool) -> tuple[int, float]:
+        """Return how many passes are made at most, and the agreement that ends them."""
+        if exact:
+            return MOVING_PASSES if moves else PASSES, AGREEMENT
+        return MOVING_FIT_PASSES if moves else FIT_PASSES, FIT_AGREEMENT
 
-        By Aitken's relaxation from the phase given; never by one pass alone, whose response would
-        be that of the phase given.
+    def _agree(self, respond: Callable, trial: Trial, phase: np.ndarray, passes: int,
+               agreement: float) -> tuple[Response, np.ndarray, bool]:
         """
-        residual, part = None, 1.0
+        Return the response with the phase that it has itself, this phase, and whether they agree.
+
+        Begins with the phase given (rows,); never one pass alone, whose response would be that of
+        the phase given.
+        """
+        phases: list[np.ndarray] = []
+        residuals: list[np.ndarray] = []
         for _ in range(passes):
             response = respond(trial, trial.inputs._replace(phase=phase))
-            before, residual = residual, self._phase(response.output) - phase
-            if before is not None:
-                if np.sqrt(np.mean(residual ** 2)) < AGREEMENT:
-                    break
-                change = residual - before
-                part *= -float(before @ change) / max(float(change @ change), 1e-300)
-                part = min(max(part, SHORTEST), 1.0)
-            phase = phase + part * residual
-        return response, phase
+            residual = self._phase(response.output) - phase
+            if phases and np.sqrt(np.mean(residual ** 2)) < agreement:
+                return response, phase, True
+            if not np.all(np.isfinite(residual)):
+                break
+            phases.append(phase)
+            residuals.append(residual)
+            phase = np.clip(_next_phase(phases[-LOOK_BACK:], residuals[-LOOK_BACK:]), 0.0, 1.0)
+        return response, phase, False
+
+    def _row_by_row(self, chain: Chain, trial: Trial) -> Response:
+        """Return the response of an arm whose phase is found in each row before the next."""
+        balance = self._balance(chain)
+        arm = Stepper(self.model, chain, self.model.first_stage(chain), balance)
+        rest = arm.start()
+        columns = [np.broadcast_to(column, trial.drive.shape).tolist()
+                   for column in (trial.drive, *trial.inputs)]
+        rows = [(arm.step(drive, Inputs(*inputs)), balance.output, balance.operators[0].input)
+                for drive, *inputs in zip(*columns)]
+        angles, outputs, stage_inputs = np.array(rows, dtype=float).reshape(-1, 3).T
+        return Response(angles, outputs, stage_inputs, rest)
 
     def _phase(self, given: np.ndarray) -> np.ndarray:
         """Martensite share as the operator's output shows it."""
@@ -310,9 +337,19 @@ class Simulator:
         return Response(angles, outputs, stage_inputs, rest)
 
 
+def _next_phase(phases: Sequence[np.ndarray], residuals: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the phase to try after some with their residuals, by Anderson's acceleration."""
+    if len(phases) == 1:
+        # What works against its cause would swing to and fro.
+        return phases[0] + 0.5 * residuals[0]
+    steps, changes = np.diff(phases, axis=0).T, np.diff(residuals, axis=0).T
+    parts = np.linalg.lstsq(changes, residuals[-1], rcond=1e-10)[0]
+    return phases[-1] + residuals[-1] - (steps + changes) @ parts
+
+
 def predict(model: MuscleModel, measurement: Measurement) -> np.ndarray:
     """Simulate every row of a measurement with the model and its effects, shape (rows,)."""
-    return Simulator(model, measurement).run(model.effects)
+    return Simulator(model, measurement).run(model.effects, exact=True)
 
 
 def predict_linear(model: MuscleModel, measurement: Measurement) -> np.ndarray:

@@ -33,6 +33,8 @@ class Targets:
         self._geometry = geometry
         self._chain = chain
         self._angle_at_rest = angle_at_rest
+        # A turn of the target up to this [rad] leaves the direction of friction as it is.
+        self.dead_band = 0.0
         self.reset()
 
     def reset(self) -> None:
@@ -71,6 +73,9 @@ class Targets:
 
     def _hold(self, theta: float, true: float) -> Reference:
         geometry = self._geometry
+        friction = sum(effect.resistance()[0] for effect in self._chain.mechanism)
+        if friction > 0.0:
+            true = self._with_direction(true)
         statics = Statics.of(geometry, np.array([true]))
         for effect in self._chain.mechanism:
             statics = effect.forward(statics, geometry)
@@ -81,11 +86,17 @@ class Targets:
         if moment < 0.0:
             raise RangeError(f'nothing pulls the arm to the target angle {theta:.4f} rad; the '
                              'muscle would have to push')
-        friction = sum(effect.resistance()[0] for effect in self._chain.mechanism)
-        if friction > 0.0:
-            start = self._angle_at_rest() if self._angle is None else self._angle
-            if true != start:
-                self._direction = math.copysign(1.0, true - start)
         self._angle = true
         force = max(moment - self._direction * friction, 0.0) / leverage
         return Reference(float(statics.length[0]), force)
+
+    def _with_direction(self, true: float) -> float:
+        """Note the direction of the motion to an angle, and return where it leads [rad]."""
+        start = self._angle_at_rest() if self._angle is None else self._angle
+        way = true - start
+        if way * self._direction > 0.0 or abs(way) > self.dead_band:
+            self._direction = math.copysign(1.0, way)
+        elif self._angle is not None:
+            # Not a turn yet: the arm sticks at the furthest target.
+            return start
+        return true

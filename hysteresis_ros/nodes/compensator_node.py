@@ -31,7 +31,7 @@ from hysteresis_ros.kernels.warm_up import warm_up_controller
 from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, WARN
 from hysteresis_ros.nodes.feedback import AngleFeedback
 from hysteresis_ros.nodes.parameters import (
-    check_limits, GEOMETRY, MODEL, NAMES, Parameters, Spec, VOLTAGE_LIMITS)
+    check_limits, GEOMETRY, MODEL, NAMES, Parameters, Spec, TARGETS, VOLTAGE_LIMITS)
 from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
 from hysteresis_ros.nodes.reference import (
     ArmReference, load_model, needs_ambient, read_angle, read_reference, seconds)
@@ -45,9 +45,15 @@ COMPENSATION = (
          's', 0.0, 60.0),
     Spec('dead_band', 0.0, 'Reversals of the reference length up to this are not followed, '
          'because the inverse amplifies their noise', 'm', 0.0, 0.01),
+    Spec('rate_limit', 0.0, 'Largest change of the setpoint a second; the rest of the way is done '
+         'by the repeats. 0 for none', 'V/s', 0.0, 1000.0),
     Spec('horizon', 5.0, 'Time in which a muscle that the model knows to lag is to reach its '
          'temperature; it is overdriven meanwhile, within the limits. 0 for never overdriven, as '
          'without republish_period', 's', 0.0, 600.0),
+    Spec('lag_margin', 0.3, "Share by which the muscle's time constant may differ from the "
+         "model's; "
+         'the larger, the later it comes, and the less can it go too far',
+         '', 0.0, 0.9, read_only=True),
     Spec('feedback', False, 'Whether the measured angle corrects the setpoint slowly',
          read_only=True),
     Spec('feedback_gain', 0.1, 'Correction rate of the target angle per error', '1/s', 0.0, 10.0),
@@ -73,7 +79,7 @@ class CompensatorNode(Node):
         For `rclpy.node.Node`, such as ``namespace`` or ``parameter_overrides``.
     """
 
-    PARAMETERS = MODEL + VOLTAGE_LIMITS + COMPENSATION + GEOMETRY + NAMES
+    PARAMETERS = MODEL + VOLTAGE_LIMITS + COMPENSATION + TARGETS + GEOMETRY + NAMES
 
     def __init__(self, model: MuscleModel | None = None, **options: Any) -> None:
         super().__init__('hysteresis_compensator', **options)
@@ -84,7 +90,8 @@ class CompensatorNode(Node):
         # Before anything is subscribed: the first reference must not wait for a compiler.
         self._ready_after = warm_up_controller(self._model)
         self.get_logger().info(f'kernels ready in {self._ready_after:.1f} s')
-        self._controller = self._model.controller(arm=True)
+        self._controller = self._model.controller(
+            arm=True, lag_margin=parameters['lag_margin'])
         self._integral = AngleFeedback()
         self._timer = None
         self._silent = True
@@ -112,9 +119,10 @@ class CompensatorNode(Node):
         self._muscle, self._joint = parameters['muscle_name'], parameters['joint_name']
         self._feedback = parameters['feedback']
         self._geometry = BicepGeometry.from_mapping(parameters)
-        self._arm = ArmReference(self._geometry, self._model)
+        self._arm = ArmReference(self._geometry, self._model, parameters['target_dead_band'])
         self._controller.limits = parameters['minimum_voltage'], parameters['maximum_voltage']
         self._controller.dead_band = parameters['dead_band']
+        self._controller.rate_limit = parameters['rate_limit'] or math.inf
         # Whoever overdrives has to come back: that is done by the repeats.
         repeated = parameters['republish_period'] > 0.0
         self._controller.horizon = (parameters['horizon'] if repeated else 0.0) or math.inf
@@ -192,7 +200,7 @@ class CompensatorNode(Node):
     def _repeat(self) -> None:
         """Publish when there was silence since the last look, half a period ago."""
         if self._silent and self._wanted is not None:
-            self._publish(self._controller.hold(self._now()))
+            self._publish(self._controller.hold(self._now(), self._ambient))
             self._repeated += 1
         else:
             self._silent = True
@@ -248,6 +256,9 @@ def _check(values: Mapping[str, Any]) -> None:
     if 0.0 < horizon < period:
         raise ParameterError(f'republish_period {period:g} s is longer than the horizon of '
                              f'{horizon:g} s; a muscle would be overdriven for too long')
+    if values['rate_limit'] > 0.0 and period == 0.0:
+        raise ParameterError('rate_limit needs the repeats, which do the rest of the way: give '
+                             'republish_period')
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -24,7 +24,7 @@ from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.errors import RangeError
 from hysteresis_ros.nodes.diagnostics import Diagnostics, WARN
 from hysteresis_ros.nodes.parameters import (
-    ANGLE_LIMITS, check_limits, GEOMETRY, MODEL, NAMES, Parameters)
+    ANGLE_LIMITS, check_limits, GEOMETRY, MODEL, NAMES, Parameters, TARGETS)
 from hysteresis_ros.nodes.qos import COMMANDS
 from hysteresis_ros.nodes.reference import ArmReference, load_model
 from hysteresis_ros.nodes.running import run
@@ -45,7 +45,7 @@ class GeometryNode(Node):
         For `rclpy.node.Node`, such as ``namespace`` or ``parameter_overrides``.
     """
 
-    PARAMETERS = GEOMETRY + ANGLE_LIMITS + MODEL + NAMES
+    PARAMETERS = GEOMETRY + ANGLE_LIMITS + TARGETS + MODEL + NAMES
 
     def __init__(self, model: MuscleModel | None = None, **options: Any) -> None:
         super().__init__('bicep_geometry', **options)
@@ -67,7 +67,8 @@ class GeometryNode(Node):
         geometry = BicepGeometry.from_mapping(parameters)
         if self._model is not None:
             self._model = dataclasses.replace(self._model, geometry=geometry)
-        self._reference = ArmReference(geometry, self._model).reference
+        self._reference = ArmReference(
+            geometry, self._model, parameters['target_dead_band']).reference
 
     def _on_target(self, message: Float64) -> None:
         self._received += 1

@@ -119,6 +119,12 @@ ANGLE_LIMITS = (
          'rad', 0.0, 3.1416),
 )
 
+TARGETS = (
+    Spec('target_dead_band', 0.001, 'Turns of the target angle up to this are not followed, where '
+         'friction or backlash of the model is undone: noise would swing the setpoint by all that '
+         'is undone', 'rad', 0.0, 0.1),
+)
+
 VOLTAGE_LIMITS = (
     Spec('minimum_voltage', 0.0, 'Smallest voltage that is ever commanded', 'V', 0.0, 48.0),
     Spec('maximum_voltage', 6.0, 'Largest voltage that is ever commanded', 'V', 0.0, 48.0),

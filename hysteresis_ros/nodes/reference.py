@@ -80,16 +80,19 @@ class ArmReference:
         The arm.
     model : MuscleModel, optional
         Its effects of the arm and of the sensor are undone; none without it.
+    dead_band : float
+        Turn of the target [rad] up to which friction and backlash are not undone anew.
     """
 
-    def __init__(self, geometry: BicepGeometry, model: MuscleModel | None = None) -> None:
+    def __init__(self, geometry: BicepGeometry, model: MuscleModel | None = None,
+                 dead_band: float = 0.0) -> None:
         self._geometry = geometry
         if model is None or not any(effect.stage in STAGES for effect in model.effects):
             self.reference = self._probe = geometry.reference
         else:
-            self.reference = model.controller().reference
+            self.reference = model.controller(angle_dead_band=dead_band).reference
             # Friction makes a reference depend on the one before, so a search needs its own.
-            self._probe = model.controller().reference
+            self._probe = model.controller(angle_dead_band=dead_band).reference
 
     def angle(self, length: float) -> float:
         """

@@ -13,7 +13,7 @@ from typing import Sequence
 
 import numpy as np
 
-from .base import HysteresisOperator, Inversion
+from .base import HysteresisOperator, Inversion, resolution
 from ..errors import ParameterError
 
 
@@ -87,8 +87,9 @@ class Cascade:
         Returns
         -------
         Inversion
-            The drive, the output that it gives, and whether a stage was asked for more than it
-            can give. If a number is not finite the present drive, flagged as saturated.
+            The drive, the output that it gives, and whether that is not what was asked for because
+            a stage cannot give as much. If a number is not finite the present drive, flagged as
+            saturated.
 
         """
         if not all(map(math.isfinite, (y, *coupled))):
@@ -99,7 +100,10 @@ class Cascade:
                 wanted, *(option[k] for option in options if option))
             beyond = beyond or saturated
             wanted = coupled[k - 1] - drive if k else 0.0
-        return Inversion(drive, self.peek((drive, *coupled)), beyond)
+        reached = self.peek((drive, *coupled))
+        # On a plateau of a later stage what an earlier one lacks does not show.
+        exact = abs(reached - y) <= resolution(self.stages[-1].output_range)
+        return Inversion(drive, reached, beyond and not exact)
 
     def invert_length(self, length: float, force: float, *options: Sequence[float]) -> Inversion:
         """Find the drive for a length under a force, with two stages."""

@@ -94,6 +94,14 @@ class CompiledOperator(HysteresisOperator):
         """Return how many entries of the memory mean something."""
         return len(self.memory)
 
+    def snapshot(self) -> np.ndarray:
+        """Return the memory for `rewind`."""
+        return self.memory[:self._used()].copy()
+
+    def rewind(self, snapshot: np.ndarray) -> None:
+        """Go back to a memory that `snapshot` returned."""
+        self.memory[:len(snapshot)] = snapshot
+
     def move_memory(self, memory: np.ndarray) -> None:
         """Keep what is remembered in another array from now on, shape (Q,)."""
         used = self._used()
