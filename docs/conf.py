@@ -25,7 +25,7 @@ exclude_patterns = ['_build']
 autodoc_mock_imports = [
     'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
     'rcl_interfaces', 'rclpy', 'rosbag2_py', 'rosgraph_msgs', 'sensor_msgs', 'serial', 'std_msgs',
-    'std_srvs']
+    'std_srvs', 'trajectory_msgs', 'visualization_msgs']
 autodoc_member_order = 'bysource'
 autodoc_typehints = 'none'      # the docstrings give the types
 numpydoc_class_members_toctree = False

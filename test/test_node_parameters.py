@@ -16,14 +16,16 @@ import yaml
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import linkage as laboratory
-from hysteresis_ros.nodes import bridge_node, compensator_node, geometry_node, monitor_node
+from hysteresis_ros.nodes import (
+    bridge_node, compensator_node, geometry_node, marker_node, monitor_node)
 from hysteresis_ros.nodes.parameters import (
     check_limits, GEOMETRY, NAMES, Parameters, Spec, VOLTAGE_LIMITS)
 
 NODES = {'bicep_geometry': geometry_node.GeometryNode,
          'hysteresis_compensator': compensator_node.CompensatorNode,
          'hardware_bridge': bridge_node.BridgeNode,
-         'model_monitor': monitor_node.MonitorNode}
+         'model_monitor': monitor_node.MonitorNode,
+         'arm_markers': marker_node.MarkerNode}
 
 
 @pytest.fixture

@@ -23,7 +23,8 @@ import pytest
 import hysteresis_ros
 
 NODES = {'geometry_node': 'bicep_geometry', 'compensator_node': 'hysteresis_compensator',
-         'bridge_node': 'hardware_bridge', 'monitor_node': 'model_monitor'}
+         'bridge_node': 'hardware_bridge', 'monitor_node': 'model_monitor',
+         'marker_node': 'arm_markers'}
 EXECUTABLES = ['hysteresis', *NODES]
 # rosdep's names of what is imported under another name.
 ROSDEP = {'serial': 'python3-serial', 'yaml': 'python3-yaml'}
@@ -78,7 +79,7 @@ def test_the_ament_index_knows_the_package(prefix, monkeypatch):
 def test_share_holds_parameters_and_launch_files(prefix, root):
     """All that the checkout has of them is installed."""
     share = prefix / 'share' / 'hysteresis_ros'
-    for pattern in ('config/*.yaml', 'launch/*.py'):
+    for pattern in ('config/*', 'launch/*.py', 'urdf/*.xacro'):
         expected = sorted(path.name for path in root.glob(pattern))
         assert expected
         assert sorted(path.name for path in share.glob(pattern)) == expected
@@ -157,7 +158,7 @@ def wheel(root, tmp_path_factory):
     source.mkdir()
     for name in ('setup.py', 'setup.cfg', 'package.xml', 'LICENSE'):
         shutil.copy(root / name, source)
-    for name in ('hysteresis_ros', 'config', 'launch', 'resource'):
+    for name in ('hysteresis_ros', 'config', 'launch', 'resource', 'urdf'):
         shutil.copytree(root / name, source / name,
                         ignore=shutil.ignore_patterns('__pycache__'))
     done = subprocess.run(
