@@ -30,7 +30,7 @@ class Follower:
         self._time = -math.inf
         self._trajectory: Trajectory | None = None
         self._start = 0.0
-        self._late = False
+        self._late = 0.0
 
     @property
     def moving(self) -> bool:
@@ -38,13 +38,13 @@ class Follower:
         return self._trajectory is not None
 
     @property
-    def late(self) -> bool:
-        """Whether the last step fell short of what was asked for, by its speed."""
+    def late(self) -> float:
+        """How long the target still needs to what was asked for at the last step [s]."""
         return self._late
 
     def stop(self, target: float | None = None) -> None:
         """Stand at `target` [rad]; None if nothing is asked of the arm."""
-        self._target, self._trajectory, self._late = target, None, False
+        self._target, self._trajectory, self._late = target, None, 0.0
 
     def follow(self, trajectory: Trajectory, start: float, now: float,
                measured: float | None = None) -> None:
@@ -77,12 +77,12 @@ class Follower:
             self._time = now
             return self._target
         wanted = trajectory.angle(now - self._start)
-        self._late = False
+        self._late = 0.0
         if self._target is not None:
             reach = self.maximum_speed * max(now - self._time, 0.0)
             change = wanted - self._target
-            self._late = abs(change) > reach
-            if self._late:
+            if abs(change) > reach:
+                self._late = (abs(change) - reach) / self.maximum_speed
                 wanted = self._target + math.copysign(reach, change)
         self._target, self._time = wanted, now
         if not self._late and now - self._start >= trajectory.end:

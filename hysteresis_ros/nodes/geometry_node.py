@@ -36,7 +36,7 @@ from hysteresis_ros.nodes.commands import read_command, read_trajectory
 from hysteresis_ros.nodes.diagnostics import Diagnostics, WARN
 from hysteresis_ros.nodes.parameters import (
     ANGLE_LIMITS, check_limits, GEOMETRY, MODEL, NAMES, Parameters, Spec)
-from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
+from hysteresis_ros.nodes.qos import COMMANDS, LATEST, MEASUREMENTS
 from hysteresis_ros.nodes.reference import (
     ArmReference, let_go, load_model, read_angle, seconds)
 from hysteresis_ros.nodes.running import run
@@ -44,6 +44,9 @@ from hysteresis_ros.nodes.running import run
 if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
 
+
+# Seconds by which a target may be late without a word: a message that was delayed.
+LATE = 1.0
 
 MOTION = (
     Spec('maximum_speed', 0.2, 'Largest speed of the target on a trajectory or behind joint '
@@ -90,8 +93,7 @@ class GeometryNode(Node):
         self.create_subscription(
             JointTrajectory, 'target_trajectory', self._on_trajectory, COMMANDS)
         self.create_subscription(JointState, 'joint_commands', self._on_command, COMMANDS)
-        self.create_subscription(
-            JointState, 'joint_states', self._on_joint_states, MEASUREMENTS)
+        self.create_subscription(JointState, 'joint_states', self._on_joint_states, LATEST)
         self._timer = self.create_timer(1.0 / parameters['trajectory_rate'], self._go_on)
         self._timer.cancel()
 
@@ -176,11 +178,11 @@ class GeometryNode(Node):
         target = self._follower.step(now)
         if target is not None:
             self._pass_on(target)
-        if self._follower.late:
+        if self._follower.late > LATE:
             self._diagnostics.set('late', WARN, (
-                'the target moves as fast as the muscle can, '
-                f'{self._follower.maximum_speed:g} rad/s, behind what is asked for'))
-        else:
+                f'the target is {self._follower.late:.1f} s behind what is asked for: it moves at '
+                f'{self._follower.maximum_speed:g} rad/s (maximum_speed)'))
+        elif not self._follower.late:
             self._diagnostics.clear('late')
 
     def _let_go(self, silence: float) -> None:

@@ -25,7 +25,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.nodes.parameters import GEOMETRY, NAMES, Parameters, Spec
-from hysteresis_ros.nodes.qos import MEASUREMENTS
+from hysteresis_ros.nodes.qos import LATEST
 from hysteresis_ros.nodes.reference import read_angle
 from hysteresis_ros.nodes.running import run
 
@@ -82,7 +82,7 @@ class MarkerNode(Node):
         for name, forearm in FOREARMS.items():
             self.create_subscription(
                 JointState, forearm.topic,
-                lambda message, name=name: self._take(name, message), MEASUREMENTS)
+                lambda message, name=name: self._take(name, message), LATEST)
         # By the wall: a simulation at 60 times real time is to flood nobody's screen.
         self.create_timer(1.0 / settings['marker_rate'], self._publish,
                           clock=Clock(clock_type=ClockType.STEADY_TIME))
