@@ -194,6 +194,23 @@ def test_a_commander_with_nonsense_counts_as_silent(graph, wrong, words):
     graph.until(lambda: arm.references[-1].position, 'a reference')
 
 
+@pytest.mark.parametrize('moving', [False, True])
+def test_a_node_that_ends_lets_go_of_what_it_was_moving(graph, moving):
+    """A single target stays in force, as the compensator holds it; a way is not left half done."""
+    arm = Arm(graph)
+    if moving:
+        arm.ways.publish(trajectory([0.0, 9.0], [2.0, 1.8]))
+    else:
+        arm.single.publish(Float64(data=2.0))
+    arm.wait(1)
+    arm.node.on_shutdown()
+    arm.single.publish(Float64(data=1.9))
+    graph.until(lambda: arm.targets[-1] == 1.9, 'the target after it')
+    graph.until(lambda: len(arm.references) >= 2 + moving, 'all references')
+    assert [len(reference.position) for reference in arm.references] == (
+        [1, 0, 1] if moving else [1, 1])
+
+
 def test_the_watchdog_goes_by_the_slower_clock(graph):
     """A simulation that runs at 60 times real time does not drop the arm for a hiccup of 50 ms."""
     arm = Arm(graph, command_timeout=1.0)

@@ -97,6 +97,11 @@ class GeometryNode(Node):
         self._timer = self.create_timer(1.0 / parameters['trajectory_rate'], self._go_on)
         self._timer.cancel()
 
+    def on_shutdown(self) -> None:
+        """Let the muscle go if somebody was moving it: nobody will take it to the end."""
+        if self._commanded is not None or self._follower.moving:
+            self._publisher.publish(self._letting_go())
+
     def _configure(self, parameters: Parameters) -> None:
         self._limits = parameters['minimum_angle'], parameters['maximum_angle']
         self._muscle, self._joint = parameters['muscle_name'], parameters['joint_name']
@@ -189,11 +194,14 @@ class GeometryNode(Node):
         self._end_commands()
         self._timer.cancel()
         self._follower.stop()
-        message = let_go(self._muscle)
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._publisher.publish(message)
+        self._publisher.publish(self._letting_go())
         self._diagnostics.set('silence', WARN, f'no joint command for {silence:.1f} s: the muscle '
                               'is switched off until the next command or target')
+
+    def _letting_go(self) -> JointState:
+        message = let_go(self._muscle)
+        message.header.stamp = self.get_clock().now().to_msg()
+        return message
 
     def _end_commands(self) -> None:
         self._commanded = None
