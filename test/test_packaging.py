@@ -254,7 +254,7 @@ def test_rosdep_knows_every_key_for_jazzy_on_noble(root):
 
 def test_what_rosdep_does_not_know_can_be_missing(root):
     """The command line works without the packages that rosdep cannot install."""
-    code = '''
+    code = """
 import sys
 
 for name in ('threadpoolctl', 'rosbags', 'dask', 'distributed', 'xacro', 'yourdfpy'):
@@ -263,7 +263,7 @@ from hysteresis_ros.cli.main import main
 from hysteresis_ros.workers import delayed, in_parallel
 assert list(in_parallel([delayed(max)(1, 2)], 1)) == [2]
 sys.exit(main(['columns']))
-'''
+"""
     done = subprocess.run([sys.executable, '-c', code], cwd=root, capture_output=True, text=True,
                           check=False, env={**os.environ, 'PYTHONPATH': str(root)})
     assert done.returncode == 0, done.stderr
