@@ -39,8 +39,8 @@ def take_readme(app, name, source):
     if name == 'readme':
         text = (ROOT / 'README.md').read_text(encoding='utf-8')
         text = text.replace('](firmware/README.md', '](firmware.md')
-        source[0] = re.sub(r'\]\(docs/', '](', re.sub(
-            r'\]\((config/|QUALITY)', r'](../\1', text))
+        text = re.sub(r'\[([^]]+)\]\(QUALITY_DECLARATION.md\)', r'\1', text)
+        source[0] = re.sub(r'\]\(docs/', '](', re.sub(r'\]\((config/)', r'](../\1', text))
     elif name == 'firmware':
         text = (ROOT / 'firmware' / 'README.md').read_text(encoding='utf-8')
         source[0] = re.sub(r'\]\((wiring|hal)', r'](../firmware/\1',

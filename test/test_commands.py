@@ -87,11 +87,12 @@ def test_a_trajectory_is_followed_in_time(graph):
     arm.single.publish(Float64(data=2.0))
     arm.wait(1)
     arm.ways.publish(trajectory([0.0, 2.0, 4.0], [2.0, 1.8, 1.8]))
-    arm.wait(2)
+    graph.until(lambda: arm.node._received == 2, 'the trajectory')
     arm.advance(5.0)
     graph.until(lambda: arm.targets[-1] == 1.8, 'the end')
-    targets = np.array(arm.targets[1:])
-    assert np.all(np.diff(targets) <= 1e-12) and len(targets) > 20
+    targets = np.array(arm.targets)
+    # A target that stays is not passed on again.
+    assert np.all(np.diff(targets) < 0.0) and len(targets) == 21
     assert np.abs(np.diff(targets)).max() < 0.0101 + 1e-9
     for reference, angle in zip(arm.references, arm.targets):
         assert (reference.position[0], reference.effort[0]) == pytest.approx(
@@ -176,16 +177,21 @@ def test_commands_of_a_controller_are_followed(graph):
     (JointState(name=['elbow'], velocity=[0.1]), 'gives no position'),
     (JointState(name=['elbow'], position=[math.nan]), 'asks for nan rad'),
     (JointState(name=['elbow'], position=[0.0]), "linkage's range")])
-def test_a_commander_with_nonsense_counts_as_silent(graph, wrong, words):
+def test_a_commander_with_nonsense_counts_as_silent(graph, capfd, wrong, words):
     """It is refused in one line, and after the watchdog's time the muscle is let go."""
     arm = Arm(graph, command_timeout=0.5)
     arm.commands.publish(JointState(name=['elbow'], position=[1.9]))
     arm.wait(1)
-    end = time.monotonic() + 5.0
-    while arm.references[-1].position and time.monotonic() < end:
+    begin = time.monotonic()
+
+    def elapsed():
+        return time.monotonic() - begin
+    while arm.references[-1].position and elapsed() < 10.0:
         arm.commands.publish(wrong)
         arm.advance(0.1)
     arm.warning(words)
+    said = [line for line in capfd.readouterr().err.splitlines() if words in line]
+    assert 1 <= len([line for line in said if 'WARN' in line]) <= 1 + elapsed() / 5.0
     assert list(arm.references[-1].name) == ['muscle']
     assert list(arm.references[-1].position) == list(arm.references[-1].effort) == []
     arm.warning('no joint command for')
@@ -255,6 +261,8 @@ def chain(graph, tmp_path):
 @pytest.mark.slow
 def test_a_sine_as_a_trajectory_is_as_good_as_angle_by_angle(graph, chain):
     """30 s on the simulated arm; then a controller that dies leaves it without voltage."""
+    voltages = graph.collect(Float64, 'applied_voltage', PLUGIN_STATES)
+    targets = graph.collect(JointState, 'target_joint_states')
     # A busy machine delays one or the other: it may try again.
     for _ in range(3):
         ratio = chain.by_trajectory() / chain.by_angles()
@@ -262,17 +270,15 @@ def test_a_sine_as_a_trajectory_is_as_good_as_angle_by_angle(graph, chain):
             break
     assert ratio <= 1.2
     commands = graph.publisher(JointState, 'joint_commands', PLUGIN_COMMANDS)
-    targets = graph.collect(JointState, 'target_joint_states')
 
     def commanded():
         commands.publish(JointState(name=['elbow'], position=[1.8]))
-        return bool(targets) and targets[-1].position[0] == 1.8
+        return targets[-1].position[0] == 1.8
     graph.until(commanded, 'the commanded angle')
-    voltages = graph.collect(Float64, 'applied_voltage', PLUGIN_STATES)
+    assert voltages[-1].data > 1.0
     silent = time.monotonic()
-    graph.until(lambda: voltages and voltages[-1].data == 0.0, 'zero')
-    assert voltages[0].data > 1.0
-    assert time.monotonic() - silent < 3.0
+    graph.until(lambda: voltages[-1].data == 0.0, 'zero')
+    assert 1.0 < time.monotonic() - silent < 6.0     # 2 s, on a busy machine
     count, cold = len(voltages), chain.now
     graph.until(lambda: chain.now > cold + 20.0, '20 s')
     assert len(voltages) > count

@@ -83,6 +83,23 @@ def test_follower_waits_for_the_start():
     follower = Follower()
     follower.follow(Trajectory([0.0, 1.0], [1.8, 1.7]), 10.0, 8.0)
     assert along(follower, (8.0, 9.9, 10.0, 10.5)) == [None, None, 1.8, pytest.approx(1.75)]
+    follower = Follower()
+    follower.follow(Trajectory([1.0], [1.8]), 10.0, 8.0, measured=2.0)
+    assert along(follower, (8.0, 9.9, 10.5)) == [None, None, pytest.approx(1.9)]
+    follower = Follower()
+    follower.stop(2.0)
+    follower.follow(Trajectory([0.0], [1.8]), 10.0, 8.0)
+    assert along(follower, (8.0, 10.0)) == [2.0, 1.8]
+
+
+def test_follower_survives_a_clock_that_is_set_back():
+    """As by a recording that begins anew."""
+    follower = Follower(maximum_speed=0.2)
+    follower.stop(2.0)
+    follower.follow(Trajectory([0.0], [1.0]), 500.0, 500.0)
+    follower.step(500.0)
+    follower.follow(Trajectory([0.0], [1.0]), 3.0, 3.0)
+    assert along(follower, (3.0, 4.0))[-1] == pytest.approx(2.0 - 0.2 * (1.0 + HEAD_START))
 
 
 def test_follower_joins_a_trajectory_that_has_begun():

@@ -27,6 +27,7 @@ class Follower:
     def __init__(self, maximum_speed: float = math.inf) -> None:
         self.maximum_speed = maximum_speed
         self._target: float | None = None
+        self._measured = False      # whether the target is only where the arm was found
         self._time = -math.inf
         self._trajectory: Trajectory | None = None
         self._start = 0.0
@@ -45,6 +46,7 @@ class Follower:
     def stop(self, target: float | None = None) -> None:
         """Stand at `target` [rad]; None if nothing is asked of the arm."""
         self._target, self._trajectory, self._late = target, None, 0.0
+        self._measured = False
 
     def follow(self, trajectory: Trajectory, start: float, now: float,
                measured: float | None = None) -> None:
@@ -61,7 +63,7 @@ class Follower:
             Where the arm is [rad]: it sets out from there if there was no target before.
         """
         if self._target is None and measured is not None and math.isfinite(measured):
-            self._target = measured
+            self._target, self._measured = measured, True
         if self._target is not None:
             trajectory = trajectory.begun_from(self._target)
         if self._trajectory is None:
@@ -71,20 +73,19 @@ class Follower:
     def step(self, now: float) -> float | None:
         """Return the target [rad] at the time `now` [s]; None as long as there is none."""
         trajectory = self._trajectory
-        if trajectory is None:
-            return self._target
-        if now < self._start:
-            self._time = now
-            return self._target
+        # A clock that was set back, as by a recording that begins anew, is no reason to wait.
+        self._time = min(self._time, now)
+        if trajectory is None or now < self._start:
+            return None if self._measured else self._target
         wanted = trajectory.angle(now - self._start)
         self._late = 0.0
         if self._target is not None:
-            reach = self.maximum_speed * max(now - self._time, 0.0)
+            reach = self.maximum_speed * (now - max(self._time, self._start - HEAD_START))
             change = wanted - self._target
             if abs(change) > reach:
                 self._late = (abs(change) - reach) / self.maximum_speed
                 wanted = self._target + math.copysign(reach, change)
-        self._target, self._time = wanted, now
+        self._target, self._time, self._measured = wanted, now, False
         if not self._late and now - self._start >= trajectory.end:
             self._trajectory = None
         return wanted

@@ -80,6 +80,7 @@ class GeometryNode(Node):
         if model is None and parameters['model_file']:
             model = load_model(parameters['model_file'], parameters, self.get_logger())
         self._model = model
+        self._passed_on: float | None = None
         self._configure(parameters)
         self._measured: float | None = None
         # When the last joint command came, by both clocks; None while no stream is followed.
@@ -110,6 +111,7 @@ class GeometryNode(Node):
         if self._model is not None:
             self._model = dataclasses.replace(self._model, geometry=self._geometry)
         self._reference = ArmReference(self._geometry, self._model).reference
+        self._passed_on = None
 
     def _now(self) -> float:
         return 1e-9 * self.get_clock().now().nanoseconds
@@ -117,6 +119,7 @@ class GeometryNode(Node):
     def _on_target(self, message: Float64) -> None:
         self._received += 1
         if self._pass_on(message.data):
+            self._diagnostics.clear('target')
             self._end_commands()
             self._timer.cancel()
             self._follower.stop(message.data)
@@ -171,7 +174,9 @@ class GeometryNode(Node):
         """Move the target on, and watch over the commander."""
         now = self._now()
         if self._commanded is not None:
-            silence = min(now - self._commanded[0], time.monotonic() - self._commanded[1])
+            last, heard = self._commanded
+            self._commanded = min(last, now), heard     # the node's clock may be set back
+            silence = min(now - last, time.monotonic() - heard)
             if silence > self._settings['command_timeout']:
                 self._let_go(silence)
                 return
@@ -181,7 +186,8 @@ class GeometryNode(Node):
 
     def _move(self, now: float) -> None:
         target = self._follower.step(now)
-        if target is not None:
+        # One that stays is held by the compensator, which overdrives for each new one.
+        if target is not None and target != self._passed_on:
             self._pass_on(target)
         if self._follower.late > LATE:
             self._diagnostics.set('late', WARN, (
@@ -194,6 +200,7 @@ class GeometryNode(Node):
         self._end_commands()
         self._timer.cancel()
         self._follower.stop()
+        self._passed_on = None
         self._publisher.publish(self._letting_go())
         self._diagnostics.set('silence', WARN, f'no joint command for {silence:.1f} s: the muscle '
                               'is switched off until the next command or target')
@@ -210,6 +217,7 @@ class GeometryNode(Node):
 
     def _pass_on(self, angle: float) -> bool:
         """Publish the reference of a target angle [rad], and return whether there is one."""
+        self._passed_on = angle
         try:
             self._check_target(angle)
             reference = self._reference(angle)
@@ -225,7 +233,6 @@ class GeometryNode(Node):
         target = JointState(name=[self._joint], position=[float(angle)])
         target.header.stamp = stamp
         self._targets.publish(target)
-        self._diagnostics.clear('target')
         return True
 
     def _refuse(self, what: str, error: RangeError) -> None:
