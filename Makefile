@@ -39,7 +39,7 @@ WORKSPACE := .workspace-$(NAME)
 endif
 
 PREFIX := $(WORKSPACE)/install/hysteresis_ros
-SOURCES := $(shell find hysteresis_ros config launch resource -type f \
+SOURCES := $(shell find hysteresis_ros config launch resource urdf -type f \
 	-not -path '*/__pycache__/*' 2>/dev/null | LC_ALL=C sort) package.xml setup.py setup.cfg
 
 # colcon on the environment's own interpreter, which becomes that of the executables.

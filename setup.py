@@ -21,6 +21,7 @@ EXECUTABLES = {
     'compensator_node': 'hysteresis_ros.nodes.compensator_node:main',
     'bridge_node': 'hysteresis_ros.nodes.bridge_node:main',
     'monitor_node': 'hysteresis_ros.nodes.monitor_node:main',
+    'marker_node': 'hysteresis_ros.nodes.marker_node:main',
     'hysteresis': 'hysteresis_ros.cli.main:main',
 }
 
@@ -125,8 +126,9 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + PACKAGE]),
         ('share/' + PACKAGE, ['package.xml']),
-        ('share/' + PACKAGE + '/config', sorted(glob('config/*.yaml'))),
+        ('share/' + PACKAGE + '/config', sorted(glob('config/*'))),
         ('share/' + PACKAGE + '/launch', sorted(glob('launch/*.py'))),
+        ('share/' + PACKAGE + '/urdf', sorted(glob('urdf/*.xacro'))),
     ],
     entry_points={
         'console_scripts': [f'{name} = {target}' for name, target in EXECUTABLES.items()],
@@ -163,6 +165,9 @@ setup(
             'flake8-quotes',
             'pydocstyle',
             'mypy',
+            # The arm's description against the geometry.
+            'xacro>=2.0',
+            'yourdfpy>=0.0.56',
         ],
     },
     cmdclass={'install_data': InstallData, 'install_scripts': InstallScripts},

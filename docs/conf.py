@@ -25,7 +25,7 @@ exclude_patterns = ['_build']
 autodoc_mock_imports = [
     'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
     'rcl_interfaces', 'rclpy', 'rosbag2_py', 'rosgraph_msgs', 'sensor_msgs', 'serial', 'std_msgs',
-    'std_srvs']
+    'std_srvs', 'trajectory_msgs', 'visualization_msgs']
 autodoc_member_order = 'bysource'
 autodoc_typehints = 'none'      # the docstrings give the types
 numpydoc_class_members_toctree = False
@@ -39,6 +39,7 @@ def take_readme(app, name, source):
     if name == 'readme':
         text = (ROOT / 'README.md').read_text(encoding='utf-8')
         text = text.replace('](firmware/README.md', '](firmware.md')
+        text = re.sub(r'\[([^]]+)\]\(QUALITY_DECLARATION.md\)', r'\1', text)
         source[0] = re.sub(r'\]\(docs/', '](', re.sub(r'\]\((config/)', r'](../\1', text))
     elif name == 'firmware':
         text = (ROOT / 'firmware' / 'README.md').read_text(encoding='utf-8')

@@ -14,7 +14,10 @@ import threading
 import time
 from typing import Any
 
-import threadpoolctl
+try:
+    import threadpoolctl
+except ImportError:     # rosdep has no key for it: BLAS keeps its threads, which costs time only
+    threadpoolctl = None
 
 # Time between two looks at whether the process that gave the work still lives [s].
 LOOK_PERIOD = 1.0
@@ -23,7 +26,7 @@ LOOK_PERIOD = 1.0
 Progress = Callable[[Iterable, int], Iterable]
 
 _LOCK = threading.Lock()
-_limits: threadpoolctl.threadpool_limits | None = None
+_limits: Any = None
 _holders: dict[int, int] = {}    # thread to how often it has entered
 _watching = False
 
@@ -33,11 +36,16 @@ def one_blas_thread() -> Iterator[None]:
     """
     Limit BLAS in this process to one thread, as context or as decorator of a function.
 
+    Without threadpoolctl nothing is limited.
+
     It may be entered again inside, and by several threads at once: the last to leave restores what
     was before. The main thread does so in any case: from other threads a recent OpenBLAS does not
     take what the main thread has set.
     """
     global _limits
+    if threadpoolctl is None:
+        yield
+        return
     thread = threading.get_ident()
     main = threading.current_thread() is threading.main_thread()
     with _LOCK:

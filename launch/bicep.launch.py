@@ -6,15 +6,19 @@ Start the arm: board, compensator, geometry, and the model that runs along.
 Alone it starts the simulated arm; ``port:=/dev/ttyUSB0`` the real one. When board or compensator
 end, everything ends: neither can come back alone, because the muscle's memory and the model's
 would no longer agree. The geometry has no memory and is started again.
+
+``rviz:=true`` shows the arm, ``description:=true`` publishes it for others to show.
 """
 
 from pathlib import Path
+import shlex
 from urllib.parse import parse_qsl, urlsplit
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
-from launch.substitutions import LaunchConfiguration
+from launch.substitutions import Command, LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 import yaml
 
 from hysteresis_ros.share import share_path
@@ -32,7 +36,13 @@ ARGUMENTS = {
     'monitor': ('true', 'Whether the model runs along and its residual is published'),
     'use_sim_time': ('', 'Whether all nodes follow /clock; empty: if the port is a simulated '
                      'board that does not live at real time'),
+    'description': ('false', 'Whether robot_description, the frames of the arm and markers of '
+                    'target, measured and predicted forearm are published'),
+    'rviz': ('false', 'Whether RViz shows the arm; starts what it needs'),
+    'aggregator': ('false', 'Whether diagnostic_aggregator sorts the diagnostics'),
 }
+# Each arm has its frames in its own namespace.
+TRANSFORMS = [('/tf', 'tf'), ('/tf_static', 'tf_static')]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -62,7 +72,31 @@ def start(context, *_) -> list:
     ]
     if is_true('monitor', given['monitor']):
         nodes.append(node('monitor_node'))
+    clock = {name: overrides[name] for name in ('use_sim_time',) if name in overrides}
+    rviz = is_true('rviz', given['rviz'])
+    if is_true('description', given['description']) or rviz:
+        nodes += [node('marker_node'), publisher(given, clock)]
+    if rviz:
+        nodes.append(Node(
+            package='rviz2', executable='rviz2', namespace=given['namespace'],
+            arguments=['-d', str(share_path('config/bicep.rviz'))], parameters=[clock],
+            remappings=TRANSFORMS))
+    if is_true('aggregator', given['aggregator']):
+        nodes.append(Node(
+            package='diagnostic_aggregator', executable='aggregator_node',
+            parameters=[str(share_path('config/diagnostics.yaml'))], output='screen'))
     return nodes
+
+
+def publisher(given: dict, clock: dict) -> Node:
+    """Return the node that publishes the description and the frames of the arm."""
+    description = ' '.join(['xacro', shlex.quote(str(share_path('urdf/bicep.urdf.xacro'))),
+                            shlex.quote(f'params_file:={given["params_file"]}')])
+    return Node(
+        package='robot_state_publisher', executable='robot_state_publisher',
+        namespace=given['namespace'], output='screen', remappings=TRANSFORMS,
+        parameters=[{'robot_description': ParameterValue(Command(description), value_type=str)},
+                    clock])
 
 
 def port_in(params_file: str) -> str:

@@ -9,16 +9,18 @@ classes, so that the file's own part is tested everywhere.
 
 import ast
 import importlib.util
+import shlex
 import sys
 import types
 
 import pytest
 
-from hysteresis_ros.nodes import bridge_node, compensator_node, geometry_node, monitor_node
+from hysteresis_ros.nodes import (
+    bridge_node, compensator_node, geometry_node, marker_node, monitor_node)
 
 PARAMETERS = {spec.name for kind in (
     bridge_node.BridgeNode, compensator_node.CompensatorNode, geometry_node.GeometryNode,
-    monitor_node.MonitorNode) for spec in kind.PARAMETERS}
+    marker_node.MarkerNode, monitor_node.MonitorNode) for spec in kind.PARAMETERS}
 
 
 class Record:
@@ -43,8 +45,9 @@ def file(root, monkeypatch):
         'launch': {'LaunchDescription': Record},
         'launch.actions': {'DeclareLaunchArgument': Record, 'OpaqueFunction': Record,
                            'Shutdown': Record},
-        'launch.substitutions': {'LaunchConfiguration': Configuration},
-        'launch_ros': {}, 'launch_ros.actions': {'Node': Record}}
+        'launch.substitutions': {'Command': Record, 'LaunchConfiguration': Configuration},
+        'launch_ros': {}, 'launch_ros.actions': {'Node': Record},
+        'launch_ros.parameter_descriptions': {'ParameterValue': Record}}
     for name, contents in stand_ins.items():
         module = types.ModuleType(name)
         vars(module).update(contents)
@@ -73,7 +76,8 @@ def test_it_declares_its_arguments_and_starts_with_a_function(file):
     """Every argument has a default, so that the file starts alone."""
     *declared, function = file.generate_launch_description().given[0]
     assert [argument.given[0] for argument in declared] == list(file.ARGUMENTS) == [
-        'port', 'model_file', 'params_file', 'namespace', 'feedback', 'monitor', 'use_sim_time']
+        'port', 'model_file', 'params_file', 'namespace', 'feedback', 'monitor', 'use_sim_time',
+        'description', 'rviz', 'aggregator']
     assert all(argument.named['description'] for argument in declared)
     assert function.named['function'] is file.start
 
@@ -130,6 +134,32 @@ def test_an_argument_that_is_neither_true_nor_false(file):
         start(file, feedback='maybe')
 
 
+def test_the_arm_is_described_where_that_is_wanted(file, root, tmp_path):
+    """From the parameters that the nodes have, in the arm's own frames, by the nodes' clock."""
+    path = tmp_path / 'my arm.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    payload_mass: 0.2\n', encoding='utf-8')
+    nodes = start(file, description='true', params_file=str(path), namespace='left',
+                  port='sim://bicep?speed=60')
+    assert list(nodes)[4:] == ['marker_node', 'robot_state_publisher']
+    described = nodes['robot_state_publisher']
+    description, clock = described['parameters']
+    command, = description['robot_description'].given[0].given
+    assert shlex.split(command) == [
+        'xacro', str(root / 'urdf' / 'bicep.urdf.xacro'), f'params_file:={path}']
+    assert clock == {'use_sim_time': True}
+    assert described['namespace'] == 'left'
+    assert described['remappings'] == [('/tf', 'tf'), ('/tf_static', 'tf_static')]
+
+
+def test_rviz_starts_what_it_shows(file, root):
+    """Its configuration, and the description with it; the aggregator is a matter of its own."""
+    nodes = start(file, rviz='true')
+    assert list(nodes)[4:] == ['marker_node', 'robot_state_publisher', 'rviz2']
+    assert nodes['rviz2']['arguments'] == ['-d', str(root / 'config' / 'bicep.rviz')]
+    assert nodes['rviz2']['parameters'] == [{}]
+    assert list(start(file, aggregator='true'))[4:] == ['aggregator_node']
+
+
 def test_real_launch_reads_it(root):
     """Where ROS 2 is installed, its own classes take the arguments."""
     launch = pytest.importorskip('launch', reason='launch comes with ROS 2 only')
@@ -150,5 +180,6 @@ def test_it_imports_nothing_but_launch_and_the_share_directory(root):
     modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     modules |= {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import)
                 for alias in node.names}
-    assert modules == {'pathlib', 'urllib.parse', 'yaml', 'launch', 'launch.actions',
-                       'launch.substitutions', 'launch_ros.actions', 'hysteresis_ros.share'}
+    assert modules == {'pathlib', 'shlex', 'urllib.parse', 'yaml', 'launch', 'launch.actions',
+                       'launch.substitutions', 'launch_ros.actions',
+                       'launch_ros.parameter_descriptions', 'hysteresis_ros.share'}

@@ -5,25 +5,27 @@
 import math
 import signal
 
-from node_support import Graph, process
+from node_support import Graph, process, small_model
 import pytest
 from rcl_interfaces.msg import ParameterType
-from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 import yaml
 
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import linkage as laboratory
-from hysteresis_ros.nodes import bridge_node, compensator_node, geometry_node, monitor_node
+from hysteresis_ros.nodes import (
+    bridge_node, compensator_node, geometry_node, marker_node, monitor_node)
 from hysteresis_ros.nodes.parameters import (
     check_limits, GEOMETRY, NAMES, Parameters, Spec, VOLTAGE_LIMITS)
 
 NODES = {'bicep_geometry': geometry_node.GeometryNode,
          'hysteresis_compensator': compensator_node.CompensatorNode,
          'hardware_bridge': bridge_node.BridgeNode,
-         'model_monitor': monitor_node.MonitorNode}
+         'model_monitor': monitor_node.MonitorNode,
+         'arm_markers': marker_node.MarkerNode}
 
 
 @pytest.fixture
@@ -83,6 +85,19 @@ def test_set_refuses_with_the_reason_and_takes_what_is_right(graph):
     assert set_parameter('maximum_voltage', 5.0).successful
     assert [change['maximum_voltage'] for change in node.changes] == [5.0]
     assert node.parameters['maximum_voltage'] == 5.0
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_every_node_tells_its_parameters(graph, name):
+    """`ros2 param get` on each: an attribute of ours that hides one of rclpy's would end it."""
+    model = {'model': small_model()} if name in (
+        'hysteresis_compensator', 'model_monitor') else {}
+    graph.add(NODES[name](context=graph.context, **model))
+    wanted = [spec.name for spec in NODES[name].PARAMETERS]
+    values = graph.call(GetParameters, f'{name}/get_parameters',
+                        GetParameters.Request(names=wanted)).values
+    assert [parameter_value_to_python(value) for value in values] == [
+        spec.default for spec in NODES[name].PARAMETERS]
 
 
 def test_every_parameter_is_described(graph):

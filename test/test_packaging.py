@@ -23,7 +23,8 @@ import pytest
 import hysteresis_ros
 
 NODES = {'geometry_node': 'bicep_geometry', 'compensator_node': 'hysteresis_compensator',
-         'bridge_node': 'hardware_bridge', 'monitor_node': 'model_monitor'}
+         'bridge_node': 'hardware_bridge', 'monitor_node': 'model_monitor',
+         'marker_node': 'arm_markers'}
 EXECUTABLES = ['hysteresis', *NODES]
 # rosdep's names of what is imported under another name.
 ROSDEP = {'serial': 'python3-serial', 'yaml': 'python3-yaml'}
@@ -78,7 +79,7 @@ def test_the_ament_index_knows_the_package(prefix, monkeypatch):
 def test_share_holds_parameters_and_launch_files(prefix, root):
     """All that the checkout has of them is installed."""
     share = prefix / 'share' / 'hysteresis_ros'
-    for pattern in ('config/*.yaml', 'launch/*.py'):
+    for pattern in ('config/*', 'launch/*.py', 'urdf/*.xacro'):
         expected = sorted(path.name for path in root.glob(pattern))
         assert expected
         assert sorted(path.name for path in share.glob(pattern)) == expected
@@ -157,7 +158,7 @@ def wheel(root, tmp_path_factory):
     source.mkdir()
     for name in ('setup.py', 'setup.cfg', 'package.xml', 'LICENSE'):
         shutil.copy(root / name, source)
-    for name in ('hysteresis_ros', 'config', 'launch', 'resource'):
+    for name in ('hysteresis_ros', 'config', 'launch', 'resource', 'urdf'):
         shutil.copytree(root / name, source / name,
                         ignore=shutil.ignore_patterns('__pycache__'))
     done = subprocess.run(
@@ -237,13 +238,56 @@ def test_every_import_is_a_declared_dependency(root, description):
     pip = {Requirement(line).name.lower() for line in description.install_requires}
     for extra in ('bags', 'cluster'):
         pip |= {Requirement(line).name.lower() for line in description.extras_require[extra]}
-    optional = {'rosbags', 'dask', 'distributed'}   # no rosdep keys; rosbag2_py does the same
+    # No rosdep keys. rosbag2_py does what rosbags does; the others make things faster.
+    optional = {'rosbags', 'dask', 'distributed', 'threadpoolctl'}
     by_rosdep = {name for name in modules
                  if ROSDEP.get(name, f'python3-{name}') in rosdep or name in rosdep}
     assert modules - by_rosdep - optional == set()
     pip_names = {'serial': 'pyserial', 'yaml': 'pyyaml', 'distributed': 'dask'}
     from_ros = {name for name in modules if name in rosdep}
     assert {pip_names.get(name, name) for name in modules - from_ros} <= pip
+
+
+def test_rosdep_knows_every_key_for_jazzy_on_noble(root):
+    """A key that the list does not have has to be looked up; one from pip would bar a release."""
+    lines = (root / 'test/rosdep_jazzy_noble.txt').read_text(encoding='utf-8').splitlines()
+    known = dict(line.split() for line in lines if line and not line.startswith('#'))
+    package = parse_package(str(root / 'package.xml'))
+    keys = {depend.name for depend in (
+        *package.build_depends, *package.exec_depends, *package.test_depends)}
+    assert keys - set(known) == set()
+    assert set(known) - keys == set(), 'keys that nothing depends on any more'
+    for key, debian in known.items():
+        assert not key.endswith('-pip')
+        assert debian == (key if '-' in key else f'ros-jazzy-{key.replace("_", "-")}')
+
+
+def test_what_rosdep_does_not_know_can_be_missing(root):
+    """The command line works without the packages that rosdep cannot install."""
+    code = """
+import sys
+
+for name in ('threadpoolctl', 'rosbags', 'dask', 'distributed', 'xacro', 'yourdfpy'):
+    sys.modules[name] = None
+from hysteresis_ros.cli.main import main
+from hysteresis_ros.workers import delayed, in_parallel
+assert list(in_parallel([delayed(max)(1, 2)], 1)) == [2]
+sys.exit(main(['columns']))
+"""
+    done = subprocess.run([sys.executable, '-c', code], cwd=root, capture_output=True, text=True,
+                          check=False, env={**os.environ, 'PYTHONPATH': str(root)})
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_quality_declaration_says_what_holds(root):
+    """Its level is one that REP-2004 grants this version, and the README links to it."""
+    text = (root / 'QUALITY_DECLARATION.md').read_text(encoding='utf-8')
+    level = int(re.search(r'Quality Level (\d)\*\*', text).group(1))
+    stable = int(hysteresis_ros.__version__.split('.')[0]) >= 1
+    assert level == 4 or stable
+    assert '](QUALITY_DECLARATION.md)' in (root / 'README.md').read_text(encoding='utf-8')
+    for name in re.findall(r'\]\(([^)#:]+)\)', text):
+        assert (root / name).exists(), name
 
 
 def constraints(path):

@@ -191,6 +191,26 @@ class BicepGeometry:
         return (self.clamp_radius * self.anchor_height * np.sin(kappa)
                 / self.muscle_length(theta))
 
+    def point(self, theta: float, along: float, above: float = 0.0
+              ) -> tuple[float, float, float]:
+        """
+        Return where a point of the forearm is at the angle `theta` [rad].
+
+        Parameters
+        ----------
+        theta : float
+            Angle [rad].
+        along, above : float
+            Distance from the pivot along the forearm, and above the forearm [m].
+
+        Returns
+        -------
+        tuple of float
+            x (forward), y (left) and z (up) from the pivot [m].
+        """
+        sine, cosine = math.sin(theta), math.cos(theta)
+        return along * sine - above * cosine, 0.0, along * cosine + above * sine
+
     def load_moment(self, theta: ArrayLike) -> Any:
         """Moment of payload and forearm about the pivot [N m] (right side of Eq. 16)."""
         mass_length = (self.payload_mass + 0.5 * self.forearm_mass) * self.forearm_length

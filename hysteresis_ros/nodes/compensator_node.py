@@ -11,6 +11,9 @@ the last setpoint is repeated, which does not move the memory, so that the watch
 When the diagnostics say that the bridge of the same arm has begun to heat and cool the muscle
 (``~/initialise``), the memory is wiped, too, as by ``~/reset``. That also ends the repeating, so
 nothing warms the muscle again between the cycle's end and the next reference.
+
+A reference that names the muscle and gives no numbers lets it go: the setpoint is zero once, and
+nothing is repeated until the next reference.
 """
 
 from __future__ import annotations
@@ -34,7 +37,7 @@ from hysteresis_ros.nodes.parameters import (
     check_limits, GEOMETRY, MODEL, NAMES, Parameters, Spec, TARGETS, VOLTAGE_LIMITS)
 from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
 from hysteresis_ros.nodes.reference import (
-    ArmReference, load_model, needs_ambient, read_angle, read_reference, seconds)
+    ArmReference, lets_go, load_model, needs_ambient, read_angle, read_reference, seconds)
 from hysteresis_ros.nodes.running import run
 
 if TYPE_CHECKING:
@@ -145,6 +148,9 @@ class CompensatorNode(Node):
 
     def _on_reference(self, message: JointState) -> None:
         self._received += 1
+        if lets_go(message, self._muscle):
+            self._let_go()
+            return
         try:
             wanted = read_reference(message, self._muscle)
             target = self._arm.angle(wanted.length) if self._feedback else math.nan
@@ -157,6 +163,11 @@ class CompensatorNode(Node):
         if self._feedback:
             self._integral.begin(self._now())
         self._published += self._apply(self._corrected(wanted))
+
+    def _let_go(self) -> None:
+        """Switch the muscle off: without a drive it cools, and forgets what is above zero."""
+        self._reset()
+        self._publish(0.0)
 
     def _corrected(self, wanted: Reference) -> Reference:
         """Return the reference with the feedback's correction of the angle."""

@@ -61,7 +61,7 @@ class MonitorNode(Node):
 
     def __init__(self, model: MuscleModel | None = None, **options: Any) -> None:
         super().__init__('model_monitor', **options)
-        parameters = self._parameters = Parameters(
+        parameters = self._settings = Parameters(
             self, self.PARAMETERS, check=BicepGeometry.from_mapping)
         model = model or load_model(parameters['model_file'], parameters, self.get_logger())
         # Before anything is subscribed: the first sample must not wait for a compiler.
@@ -99,7 +99,7 @@ class MonitorNode(Node):
 
     def _on_joint_states(self, message: JointState) -> None:
         self._measured += 1
-        angle = read_angle(message, self._parameters['joint_name'])
+        angle = read_angle(message, self._settings['joint_name'])
         if angle is None or not math.isfinite(angle) or not math.isfinite(self._voltage):
             return
         time = seconds(message.header.stamp)
@@ -113,7 +113,7 @@ class MonitorNode(Node):
         self._time = time
         predicted = self._observer.step(time - self._start, self._voltage, self._ambient)
         self._residual = angle - predicted
-        output = JointState(name=[self._parameters['joint_name']], position=[predicted])
+        output = JointState(name=[self._settings['joint_name']], position=[predicted])
         output.header.stamp = message.header.stamp
         self._prediction.publish(output)
         self._difference.publish(Float64(data=self._residual))
@@ -121,7 +121,7 @@ class MonitorNode(Node):
         self._judge(time)
 
     def _judge(self, now: float) -> None:
-        limit, time = self._parameters['residual_limit'], self._parameters['residual_time']
+        limit, time = self._settings['residual_limit'], self._settings['residual_time']
         if abs(self._residual) <= limit:
             self._fine_until = now
             # Half the limit: a residual near it is not to come and go with each sample.

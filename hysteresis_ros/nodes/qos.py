@@ -10,3 +10,6 @@ COMMANDS = QoSProfile(depth=10000, reliability=ReliabilityPolicy.RELIABLE)
 
 # Measurements: reliable, because a recording or a prediction with gaps is worth less.
 MEASUREMENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+
+# For who looks at the latest measurement only: what it has missed is not made up for.
+LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -8,6 +8,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from sensor_msgs.msg import JointState
+
 from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
 from hysteresis_ros.errors import ModelFileError, RangeError
 from hysteresis_ros.share import share_path
@@ -15,7 +17,6 @@ from hysteresis_ros.share import share_path
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Time
     from rclpy.impl.rcutils_logger import RcutilsLogger
-    from sensor_msgs.msg import JointState
 
     from hysteresis_ros.model import MuscleModel
 
@@ -108,6 +109,16 @@ class ArmReference:
         for _ in range(PASSES):
             theta += wanted - float(self._geometry.angle(self._probe(theta).length))
         return theta
+
+
+def let_go(muscle: str) -> JointState:
+    """Return the reference that asks nothing of a muscle: its name alone, without numbers."""
+    return JointState(name=[muscle])
+
+
+def lets_go(message: JointState, muscle: str) -> bool:
+    """Whether a reference asks nothing of this muscle, so that it is to be switched off."""
+    return list(message.name) == [muscle] and not message.position and not message.effort
 
 
 def read_reference(message: JointState, muscle: str) -> Reference:
