@@ -58,21 +58,25 @@ def unit_problems(largest: Mapping[str, float],
     """
     found = []
     for name, value in largest.items():
-        most = SECONDS_OF_A_DAY if name == 'time' else QUANTITIES[name].most
-        if value > most and not confirmed(name, origin):
-            what = 'a trial takes' if name == 'time' else f'{name} reaches'
-            found.append(f'{what} {value:.4g} {unit_of_file(name)}, which is impossible; '
+        if name != 'time' and value > QUANTITIES[name].most and not confirmed(name, origin):
+            found.append(f'{name} reaches {value:.4g} {unit_of_file(name)}, which is impossible; '
                          + advice(name, value, origin))
     return found
 
 
 def unit_warnings(largest: Mapping[str, float],
                   origin: Mapping[str, Column] | None = None) -> list[str]:
-    """Return what is smaller than expected, one clause each; as `unit_problems`."""
-    return [f'{name} reaches only {value:.4g} {unit_of_file(name)}; {advice(name, value, origin)}'
-            for name, value in largest.items()
-            if name != 'time' and 0 < value < QUANTITIES[name].least
-            and not confirmed(name, origin)]
+    """Return what is smaller, or takes longer, than expected, one clause each."""
+    found = []
+    for name, value in largest.items():
+        if confirmed(name, origin):
+            continue
+        if name == 'time' and value > SECONDS_OF_A_DAY:
+            found.append(f'a trial takes {value:.4g} s; {advice(name, value, origin)}')
+        elif name != 'time' and 0 < value < QUANTITIES[name].least:
+            found.append(f'{name} reaches only {value:.4g} {unit_of_file(name)}; '
+                         + advice(name, value, origin))
+    return found
 
 
 def confirmed(name: str, origin: Mapping[str, Column] | None) -> bool:
