@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 from hysteresis_ros.diagnosis.linearised import Linearised, Start
 from hysteresis_ros.effects import catalogue
 
@@ -19,8 +20,9 @@ def make(trials, rows, seed=0):
     trial = np.repeat(np.arange(trials), rows)
     drive = np.concatenate([np.cumsum(rng.standard_normal(rows)) for _ in range(trials)])
     drive = (drive - drive.min()) / np.ptp(drive)
-    discrepancy = 1e-6 * np.exp(-0.5 * ((drive[:, None] - drive[None, :]) / 0.45) ** 2)
-    covariance = Covariance(discrepancy, 30.0 * np.arange(1.0, len(trial) + 1.0), trial, 1e-4, 0.3)
+    discrepancy = Discrepancy(np.full((len(trial), 1), 1e-3), drive[:, None] / 0.45)
+    covariance = Covariance(discrepancy, 30.0 * np.arange(1.0, len(trial) + 1.0), trial, 1e-4,
+                            np.inf, 0.3)
     starts = []
     for number in range(12):
         shape = np.cos(np.pi * (1 + number // 2) * drive + number)
