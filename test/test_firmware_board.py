@@ -199,6 +199,32 @@ def test_a_broken_cable_does_not_flood_the_host_with_explanations(board):
     assert board.transmit().count(b'# nothing done') == 5
 
 
+def test_bad_lines_are_explained_after_weeks_without_any(board):
+    """Half of the range of the clock is 25 days."""
+    def explained():
+        board.transmit()
+        board.receive(b'enable 2\n')
+        return b'nothing done' in board.transmit()
+    assert explained() and not explained()
+    for days in (1, 25, 30, 49):
+        board.library.host_leap(days * 86400000)
+        assert explained(), days
+
+
+def test_the_clock_may_wrap(board):
+    """After 49 days telemetry keeps its period, and a setpoint its age."""
+    board.library.host_leap(2 ** 32 - 400)
+    assert board.ask('config', period=50, watchdog=500)[0] == 'ok'
+    enabled(board)
+    board.advance(500)
+    assert board.pwm == PWM_STEPS // 2
+    times = [int(frame.fields['time']) for frame in board.frames()]
+    assert [time % 2 ** 32 for time in times] == [
+        (2 ** 32 - 400 + 50 * number) % 2 ** 32 for number in range(1, 11)]
+    board.advance(2)
+    assert board.pwm == 0
+
+
 def test_a_port_without_room_loses_whole_frames_only(board):
     """The host sees the gap in the numbers, and never half a frame."""
     board.telemetry()
