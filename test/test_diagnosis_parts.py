@@ -4,7 +4,7 @@
 
 import dataclasses
 
-from model_support import arm_run, bicep_model, GEOMETRY, ROWS, runs
+from model_support import arm_run, bicep_model, effect_of, GEOMETRY, ROWS, runs
 import numpy as np
 import pytest
 
@@ -197,6 +197,16 @@ def test_a_load_that_moves_with_the_arm_leaves_a_difference():
     light = bicep_model(geometry=dataclasses.replace(
         GEOMETRY, payload_mass=1e-4, forearm_mass=1e-4))
     assert np.abs(path_of(light, arm_run(both_ways))).max() < 0.02 * path.max()
+
+
+def test_what_the_sensor_adds_is_no_way_of_the_arm():
+    """The same arm takes the same way, whatever its encoder says."""
+    model = bicep_model()
+    problem = problem_for(model, [arm_run(np.linspace(0.0, 6.0, 20))])
+    clean = discrepancy.path_difference(problem, [])
+    offset = effect_of(model, 'encoder_offset', offset=5.0)
+    assert np.abs(clean).max() > 1e-3
+    np.testing.assert_array_equal(discrepancy.path_difference(problem, [offset]), clean)
 
 
 @pytest.mark.parametrize('verdict, names, alternatives, unobservable, words', [
