@@ -316,6 +316,18 @@ def test_what_the_bench_says_of_an_effect_is_one_of_its_starts():
     assert [start.effect.values for start in found if start.id == own.id].count(own.values) == 1
 
 
+def test_what_the_response_suggests_is_a_start_in_addition():
+    """Where an arm stays is where a stop may be."""
+    stop = catalogue()['end_stop'](bicep_model().surroundings)
+    measured = np.append(np.linspace(1.0, 1.9, 30), np.full(20, 1.9))
+    guesses = stop.guesses(measured)
+    assert guesses
+    without, found = starts_of(stop, 'arm'), starts_of(stop, 'arm', measured)
+    assert [start.values for start in found[:len(without)]] == [one.values for one in without]
+    for guess, start in zip(guesses, found[len(without):], strict=True):
+        assert guess.items() <= start.values.items()
+
+
 def test_usual_values_keep_what_is_chosen_and_not_fitted():
     """The start in the middle, so that nothing of a former fit is left but a choice."""
     model = bicep_model()
