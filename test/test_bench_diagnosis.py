@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
 from hysteresis_ros.diagnosis.diagnose import diagnose
@@ -114,6 +115,14 @@ def test_a_lag_shows_without_an_arm():
     found = found_in(table(lagging))
     assert found.missing == ['thermal_lag']
     assert found.effects[0].values['time_constant'] == pytest.approx(8.0, rel=0.15)
+
+
+def test_a_gain_that_chance_could_give_is_no_answer(monkeypatch):
+    """However large it is: one in twenty is the border."""
+    for p_value, missing in ((0.06, []), (0.04, ['thermal_lag'])):
+        monkeypatch.setattr(significance, 'paired_p_values',
+                            lambda gains, *rest: np.full(len(gains), p_value))
+        assert found_in(table(lagging)).missing == missing
 
 
 def test_creep_of_a_polymer_shows_and_is_plausible():
