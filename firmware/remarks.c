@@ -7,14 +7,14 @@
 
 #define MOST_SHOWN 60           // characters of a bad line
 
-static uint32_t next;
+static uint32_t last;           // time of the latest explanation
 
 #define STRING_(x) #x
 #define STRING(x) STRING_(x)
 
 void remarks_start(uint32_t now)
 {
-    next = now;
+    last = now - REMARK_PERIOD;
     writer_remark();
     writer_text(TEXT("hysteresis_ros firmware " FIRMWARE_VERSION ", protocol "
                      STRING(PROTOCOL_VERSION) "; say \"hello 1*DEB9\""));
@@ -64,10 +64,10 @@ static void show(struct text line)
 
 void remarks_explain(enum line what, const struct frame *frame, struct text line, uint32_t now)
 {
-    if ((int32_t)(now - next) < 0) {
+    if (now - last < REMARK_PERIOD) {
         return;
     }
-    next = now + REMARK_PERIOD;
+    last = now;
     if (line.length > 0 && what != LINE_TOO_LONG && line.start[line.length - 1] == '\r') {
         line.length--;
     }

@@ -11,7 +11,7 @@ controller sees nothing of what it does: all of it is feedforward, as in the pap
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,8 +47,6 @@ FORCE_STEPS, LENGTH_STEPS, ARM_STEPS = 74, 30, 40
 MARGIN = 0.02
 # The load of Fig. 9.
 ONE_LOAD = LOADS.index(3.136)
-
-Drives = Callable[[np.ndarray], np.ndarray]
 
 
 @one_blas_thread()
@@ -128,7 +126,7 @@ def experiment(seed: int, effects: Sequence[str] | None = (), jobs: int = 1) -> 
 
 def residuals(plant: Plant, model: MuscleModel, method: str, force: Measurement,
               length: Measurement,
-              chance: np.random.Generator) -> Iterator[tuple[np.ndarray, float]]:
+              rng: np.random.Generator) -> Iterator[tuple[np.ndarray, float]]:
     """
     Yield residual and output range for each row of Table I.
 
@@ -143,12 +141,12 @@ def residuals(plant: Plant, model: MuscleModel, method: str, force: Measurement,
         yield residual[chosen], span
         yield residual[~chosen], span
         if table is force:
-            wanted = inside(measured[chosen], FORCE_STEPS, chance)
+            wanted = inside(measured[chosen], FORCE_STEPS, rng)
             yield plant.force_trial(inverse.forces(wanted)) - wanted, span
         else:
             parts = []
             for trial, load in zip(LENGTH_TRIALS, LOADS):
-                wanted = inside(measured[table.column('trial') == trial], LENGTH_STEPS, chance)
+                wanted = inside(measured[table.column('trial') == trial], LENGTH_STEPS, rng)
                 parts.append(plant.length_trial(inverse.lengths(wanted, load), load) - wanted)
             yield np.concatenate(parts), span
     # Where the arm can be: no voltage, and the highest.
@@ -156,15 +154,15 @@ def residuals(plant: Plant, model: MuscleModel, method: str, force: Measurement,
     turn = np.arange(1, ARM_STEPS + 1) / ARM_STEPS
     sinusoid = 0.5 * (1.0 + np.cos(4.0 * np.pi * turn))
     low, high = ends.min() + MARGIN * np.ptp(ends), ends.max() - MARGIN * np.ptp(ends)
-    for wanted in (low + (high - low) * sinusoid, inside(ends, ARM_STEPS, chance)):
+    for wanted in (low + (high - low) * sinusoid, inside(ends, ARM_STEPS, rng)):
         angle = plant.arm_trial(inverse.angles(wanted))['angle']
         yield np.degrees(angle - wanted), 100.0
 
 
-def inside(values: np.ndarray, count: int, chance: np.random.Generator) -> np.ndarray:
+def inside(values: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
     """Return random references within the range of values, `MARGIN` from its ends."""
     margin = MARGIN * float(np.ptp(values))
-    return chance.uniform(values.min() + margin, values.max() - margin, count)
+    return rng.uniform(values.min() + margin, values.max() - margin, count)
 
 
 class Inverse:

@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bench tables that are sampled in time: no voltage has to drive them, and no arm is there."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.parameters import ParameterVector
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import experiment_tables
@@ -112,6 +117,14 @@ def test_a_lag_shows_without_an_arm():
     assert found.effects[0].values['time_constant'] == pytest.approx(8.0, rel=0.15)
 
 
+def test_a_gain_that_chance_could_give_is_no_answer(monkeypatch):
+    """However large it is: one in twenty is the border."""
+    for p_value, missing in ((0.06, []), (0.04, ['thermal_lag'])):
+        monkeypatch.setattr(significance, 'paired_p_values',
+                            lambda gains, *rest: np.full(len(gains), p_value))
+        assert found_in(table(lagging)).missing == missing
+
+
 def test_creep_of_a_polymer_shows_and_is_plausible():
     """Steps so far all go on creeping; what follows the drive at once is the operator's."""
     found = found_in(table(creeping), ('creep', 'fatigue', 'latency'))
@@ -145,6 +158,26 @@ def test_no_row_that_is_held_out_helps_to_predict_itself(name, values):
         problem = problem_for(model, [Measurement.from_columns(columns)])
         predicted.append(problem.simulate([effect], problem.trial != 1))
     np.testing.assert_allclose(*predicted, rtol=0.0, atol=1e-12)
+
+
+def test_a_fold_is_predicted_by_weights_and_parameters_of_the_others():
+    """Whatever is measured in a trial that is held out, its prediction stays."""
+    measurement = table(lagging)
+    model = identify(measurement, operator='preisach', levels=(12, 12)).model
+    lag = catalogue()['thermal_lag'](model.surroundings).with_values(time_constant=8.0)
+    predicted = []
+    for change in (0.0, 0.002):
+        columns = dict(measurement.columns)
+        columns['length'] = columns['length'] + change * (columns['trial'] == 1.0)
+        problem = problem_for(model, [Measurement.from_columns(columns)])
+        fitter = BenchFitter(problem)
+        # The same start for both: only the rows of the fold differ.
+        fit = dataclasses.replace(Response(problem, [], [lag]).fit(
+            ParameterVector([lag], 'bench').vector()), effects=[lag])
+        predicted.append(fitter.cross_validate(fit).held_out)
+    rows = problem.trial == 1
+    np.testing.assert_allclose(predicted[0][rows], predicted[1][rows], rtol=0.0, atol=1e-9)
+    assert np.abs(predicted[0] - predicted[1])[~rows].max() > 1e-4
 
 
 def test_an_extended_model_says_what_was_fitted():

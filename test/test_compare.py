@@ -8,7 +8,7 @@ import re
 from types import SimpleNamespace
 
 from hysteresis_ros.comparison.compare import bench_effects, compare, ladder
-from hysteresis_ros.comparison.signals import changes, signals_of
+from hysteresis_ros.comparison.signals import changes, signals_of, varies
 from hysteresis_ros.comparison.where import (
     binned, blocks_of, correlogram, half_width, memory, number, placed)
 from hysteresis_ros.errors import MeasurementError
@@ -246,6 +246,16 @@ def test_a_drive_outside_the_identified_range_is_warned_about(factor, words):
         origin={'voltage': Column('voltage', 'voltage', confirmed=True)})
     notes = [n for n in compare(FakeModel(), [measured]).warnings if 'identified' in n]
     assert [words in note for note in notes] == ([True] if words else [])
+
+
+@pytest.mark.parametrize('change, seen', [(0.005, False), (0.02, True)])
+def test_a_recorded_signal_has_to_vary_by_more_than_its_noise(change, seen):
+    """A supply of 12 V that wanders by 60 mV is constant; a drive is what it is."""
+    values = 12.0 * (1.0 + change * np.linspace(0.0, 1.0, 50))
+    assert varies(values, 'supply_voltage') == seen
+    assert varies(values) and not varies(np.full(50, 12.0))
+    assert varies(np.array([22.0, 22.3]), 'ambient_temperature') is False
+    assert varies(np.array([2.0, 2.6]), 'ambient_temperature') is True
 
 
 def test_one_row_and_a_constant_response_are_compared():

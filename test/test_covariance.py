@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.covariance import Covariance, LARGEST_SCALE
 from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 
 ROWS, TRIALS = 120, 3
@@ -107,6 +107,25 @@ def test_the_largest_error_is_beyond_the_expected_one_and_grows_with_it():
                     for size in (0.01, 0.02))
     assert 0.012 < small < 0.03
     assert large == pytest.approx(2.0 * small, rel=0.1)
+
+
+def test_the_largest_error_is_the_quantile_of_draws_of_any_scale():
+    """A discrepancy that is one number for all rows is normal times log-normal, by sampling."""
+    everywhere = Discrepancy(np.full((ROWS, 1), 0.01), np.zeros((ROWS, 1)))
+    covariance = Covariance(everywhere, 30.0 * np.arange(1.0, ROWS + 1.0), np.zeros(ROWS, int),
+                            0.03, np.inf, 0.8)
+    rng = np.random.default_rng(8)
+    size = 0.01 * np.exp(0.8 * rng.standard_normal(200000)) * np.abs(rng.standard_normal(200000))
+    expected = np.hypot(np.quantile(size, 0.95), 0.03)
+    assert covariance.largest_error(rng, 20000) == pytest.approx(expected, rel=0.05)
+
+
+def test_the_scale_of_the_discrepancy_has_a_bound():
+    """What is larger than twice the spread of what the bench has seen is something else."""
+    covariance = make()
+    draw = np.linalg.cholesky(smooth(ROWS, 0.01).matrix() + 1e-12 * np.eye(ROWS)) @ (
+        np.random.default_rng(9).standard_normal(ROWS))
+    assert covariance.fit(9.0 * draw)[0] == pytest.approx(LARGEST_SCALE)
 
 
 def test_a_model_without_a_known_error_has_the_noise_of_its_sensor():

@@ -11,6 +11,7 @@ from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance
 from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.linearised import linearised_starts
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of, usual
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.measurements import Measurement
@@ -303,6 +304,28 @@ def test_another_compliance_than_on_the_bench_takes_the_place_of_the_first():
     fit, = fitter.fit([list(model.effects)], fitter.covariance.points[0])
     assert fit.effects[0].values['compliance'] == pytest.approx(0.25, rel=0.1)
     assert fitter.error(fit.predicted) < 0.1 * fitter.error(fitter.simulate([[]])[0])
+
+
+def test_what_the_bench_says_of_an_effect_is_one_of_its_starts():
+    """An arm's wires may be those of the bench."""
+    model = bicep_model(['series_compliance'])
+    fitter, own = fitter_of(model, noisy(model)), model.effects[0]
+    base = Fit([], np.zeros(0), fitter.simulate([[]])[0], np.zeros((len(
+        fitter.problem.measured), 0)))
+    found = linearised_starts(fitter, base, ['series_compliance', 'payload_error'])
+    assert [start.effect.values for start in found if start.id == own.id].count(own.values) == 1
+
+
+def test_what_the_response_suggests_is_a_start_in_addition():
+    """Where an arm stays is where a stop may be."""
+    stop = catalogue()['end_stop'](bicep_model().surroundings)
+    measured = np.append(np.linspace(1.0, 1.9, 30), np.full(20, 1.9))
+    guesses = stop.guesses(measured)
+    assert guesses
+    without, found = starts_of(stop, 'arm'), starts_of(stop, 'arm', measured)
+    assert [start.values for start in found[:len(without)]] == [one.values for one in without]
+    for guess, start in zip(guesses, found[len(without):], strict=True):
+        assert guess.items() <= start.values.items()
 
 
 def test_usual_values_keep_what_is_chosen_and_not_fitted():

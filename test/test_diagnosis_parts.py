@@ -4,7 +4,7 @@
 
 import dataclasses
 
-from model_support import arm_run, bicep_model, GEOMETRY, ROWS, runs
+from model_support import arm_run, bicep_model, effect_of, GEOMETRY, ROWS, runs
 import numpy as np
 import pytest
 
@@ -34,6 +34,12 @@ def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():
     lucky = np.r_[24.0, np.zeros(23)]
     values = paired_p_values(np.stack([steady, lucky, -steady]), rng)
     assert values[0] < 0.02 and values[1] > 0.2 and values[2] > 0.9
+
+
+def test_no_p_value_is_smaller_than_the_draws_can_give():
+    """None of 99 draws was as good: one in a hundred, not none."""
+    gains = np.ones((1, 200)) + 1e-3 * np.arange(200.0)
+    assert paired_p_values(gains, np.random.default_rng(0), 99) == pytest.approx([0.01])
 
 
 def test_the_interval_of_a_gain_holds_its_value():
@@ -128,7 +134,7 @@ def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
     gain = discrepancy.sensitivity(problem, [])
     predicted = problem.simulate([])
     path = discrepancy.path_difference(problem, [])
-    found = discrepancy.covariance(problem, [], predicted, Settings())
+    found = discrepancy.discrepancy_along(problem, [], predicted, Settings()).matrix()
     assert np.diag(found) == pytest.approx((0.0004 * gain) ** 2 + path ** 2)
     assert found == pytest.approx(found.T)
     assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
@@ -136,18 +142,16 @@ def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
 
 def test_errors_of_rows_that_are_near_in_drive_and_response_are_alike(problem):
     """More so on the same way of the drive than on the way back."""
-    predicted = problem.simulate([])
-    found = discrepancy.covariance(problem, [], predicted, Settings())
+    predicted, settings = problem.simulate([]), Settings()
+    found = discrepancy.discrepancy_along(problem, [], predicted, settings).matrix()
     size = np.sqrt(np.diag(found))
-    correlation = found / np.outer(size, size)
     drive, direction = problem.signals['drive'], problem.signals['direction'] > 0.0
-    near = np.hypot((drive[:, None] - drive) / np.ptp(drive),
-                    (predicted[:, None] - predicted) / np.ptp(predicted))
-    same = direction[:, None] == direction[None, :]
-    close = near < 0.05
-    assert correlation[close & same].min() > 0.7
-    assert 0.4 < correlation[close & ~same].mean() < 0.8
-    assert correlation[near > 1.2].max() < 0.1
+    gap = np.hypot((drive[:, None] - drive) / np.ptp(drive),
+                   (predicted[:, None] - predicted) / np.ptp(predicted)) / settings.correlation
+    # The part that differs between the directions is half of the common one: 1 - 1/4 to 1 + 1/4.
+    same = np.where(direction[:, None] == direction[None, :], 1.0, 0.6)
+    np.testing.assert_allclose(found / np.outer(size, size), same / np.sqrt(1.0 + gap ** 2),
+                               atol=0.03)
 
 
 def test_the_sensitivity_is_the_slope_of_the_arm(problem):
@@ -201,6 +205,16 @@ def test_a_load_that_moves_with_the_arm_leaves_a_difference():
     assert np.abs(path_of(light, arm_run(both_ways))).max() < 0.02 * path.max()
 
 
+def test_what_the_sensor_adds_is_no_way_of_the_arm():
+    """The same arm takes the same way, whatever its encoder says."""
+    model = bicep_model()
+    problem = problem_for(model, [arm_run(np.linspace(0.0, 6.0, 20))])
+    clean = discrepancy.path_difference(problem, [])
+    offset = effect_of(model, 'encoder_offset', offset=5.0)
+    assert np.abs(clean).max() > 1e-3
+    np.testing.assert_array_equal(discrepancy.path_difference(problem, [offset]), clean)
+
+
 @pytest.mark.parametrize('verdict, names, alternatives, unobservable, words', [
     ('unknown', ['backlash'], [], {}, ['repeat the recording', 'like backlash shows best']),
     ('missing', ['payload_error'], [['encoder_offset']], {},
@@ -222,6 +236,16 @@ def test_ranked_effects_say_with_what_they_are_confused_and_what_weights_absorb(
     add_signatures(rows, signatures, np.array([[0.0], [0.0], [3.0]]))
     assert [row['confused_with'] for row in rows] == [['twin'], ['one'], []]
     assert [row['absorbed'] for row in rows] == pytest.approx([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize('cosine, confused', [(0.95, True), (-0.95, True), (0.85, False)])
+def test_signatures_that_nearly_agree_are_confused(cosine, confused):
+    """Nine tenths is the border; opposite signatures are the same one."""
+    rows = [{'effect': name} for name in ('one', 'other')]
+    signatures = np.array([[1.0, 0.0], [cosine, np.sqrt(1.0 - cosine ** 2)]])
+    add_signatures(rows, signatures, np.zeros((2, 0)))
+    assert [row['confused_with'] for row in rows] == (
+        [['other'], ['one']] if confused else [[], []])
 
 
 def test_the_ranking_begins_with_the_answer_and_ends_with_what_is_not_physical():
@@ -259,6 +283,50 @@ def test_the_noise_of_a_sensor_comes_from_its_steps():
         'time': 30.0 * np.arange(500.0), 'trial': np.zeros(500), 'voltage': angle,
         'angle': angle})
     assert problem_for(bicep_model(), [data]).noise == pytest.approx(0.001 / 12 ** 0.5, rel=1e-6)
+
+
+def test_a_long_recording_is_judged_on_some_rows_of_each_trial():
+    """In equal steps, so that what is slow is seen."""
+    model = bicep_model()
+    problem = problem_for(model, [runs(model, sizes=[400, 400])])
+    assert (problem.stride, len(problem.measured)) == (2, 400)
+    assert np.bincount(problem.trial).tolist() == [200, 200]
+
+
+def test_short_trials_have_no_empty_blocks():
+    """Three rows make a block at least."""
+    model = bicep_model()
+    problem = problem_for(model, [runs(model, sizes=[10, 40])])
+    sizes = np.bincount(problem.block)
+    assert sizes.min() >= 3
+    assert len(np.unique(problem.block[problem.trial == 0])) == 3
+    assert len(np.unique(problem.block[problem.trial == 1])) == 12
+
+
+def test_of_several_recordings_the_noisiest_counts():
+    """Of two sensors nobody knows which rows are right."""
+    model, rng = bicep_model(), np.random.default_rng(0)
+    coarse, fine = (Measurement.from_columns({
+        'time': 30.0 * np.arange(300.0), 'trial': np.zeros(300), 'voltage': np.ones(300),
+        'angle': 1.5 + step * np.round(rng.standard_normal(300) * 0.003 / step)})
+        for step in (0.001, 0.0001))
+    for order in ((coarse, fine), (fine, coarse)):
+        problem = problem_for(model, list(order))
+        assert problem.noise == pytest.approx(0.001 / 12 ** 0.5, rel=1e-6)
+    loud = Measurement.from_columns({**fine.columns, 'angle': 1.5 + 0.1 * rng.standard_normal(300)})
+    for order in ((loud, fine), (fine, loud)):
+        assert problem_for(model, list(order)).largest_noise > 0.1
+
+
+@pytest.mark.parametrize('change, seen', [(0.3, False), (3.0, True)])
+def test_a_temperature_that_hardly_changes_shows_nothing(change, seen):
+    """Half a degree is the thermometer's noise."""
+    model = bicep_model()
+    clean = runs(model)
+    ambient = 22.0 + change * np.linspace(0.0, 1.0, clean.rows)
+    problem = problem_for(model, [Measurement.from_columns(
+        {**clean.columns, 'ambient_temperature': ambient})])
+    assert ('ambient_temperature' in observable(problem)[0]) == seen
 
 
 def test_recordings_that_do_not_go_together_are_refused():

@@ -149,8 +149,12 @@ def test_an_interval_that_spans_the_range_is_said_to_say_nothing(base):
     effect.intervals = {'offset': (-2.0 * most, 3.0 * most)}
     note, = undetermined(effect, 'arm')
     assert 'encoder_offset.offset spans its physical range' in note
-    effect.intervals = {'offset': (1.5, 2.5)}
-    assert undetermined(effect, 'arm') == []
+    # The range has both signs: nine tenths of it is the border.
+    effect.intervals = {'offset': (-0.9 * most, most)}
+    assert len(undetermined(effect, 'arm')) == 1
+    for interval in ((1.5, 2.5), (-0.7 * most, most)):
+        effect.intervals = {'offset': interval}
+        assert undetermined(effect, 'arm') == []
 
 
 def test_an_effect_that_the_bench_has_shown_is_fitted_anew_to_the_arm(base, recordings):

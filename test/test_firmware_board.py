@@ -159,6 +159,15 @@ def test_no_setpoint_in_time_switches_off(board, asked, milliseconds):
     assert board.telemetry()['faults'] == 'none'
 
 
+def test_disabling_clears_the_watchdogs_fault(board):
+    """Nobody has to send a setpoint to an arm that is to stay off."""
+    enabled(board)
+    board.advance(WATCHDOG + 2)
+    assert board.telemetry()['faults'] == 'watchdog'
+    assert board.ask('disable')[0] == 'ok'
+    assert board.telemetry()['faults'] == 'none'
+
+
 def test_refused_setpoints_do_not_feed_the_watchdog(board):
     """Nor do greetings, or lines that are broken."""
     enabled(board)
@@ -197,6 +206,32 @@ def test_a_broken_cable_does_not_flood_the_host_with_explanations(board):
         board.receive(b'set 1\n')
         board.advance(10)
     assert board.transmit().count(b'# nothing done') == 5
+
+
+def test_bad_lines_are_explained_after_weeks_without_any(board):
+    """Half of the range of the clock is 25 days."""
+    def explained():
+        board.transmit()
+        board.receive(b'enable 2\n')
+        return b'nothing done' in board.transmit()
+    assert explained() and not explained()
+    for days in (1, 25, 30, 49):
+        board.library.host_leap(days * 86400000)
+        assert explained(), days
+
+
+def test_the_clock_may_wrap(board):
+    """After 49 days telemetry keeps its period, and a setpoint its age."""
+    board.library.host_leap(2 ** 32 - 400)
+    assert board.ask('config', period=50, watchdog=500)[0] == 'ok'
+    enabled(board)
+    board.advance(500)
+    assert board.pwm == PWM_STEPS // 2
+    times = [int(frame.fields['time']) for frame in board.frames()]
+    assert [time % 2 ** 32 for time in times] == [
+        (2 ** 32 - 400 + 50 * number) % 2 ** 32 for number in range(1, 11)]
+    board.advance(2)
+    assert board.pwm == 0
 
 
 def test_a_port_without_room_loses_whole_frames_only(board):
@@ -263,6 +298,22 @@ def test_the_emergency_stop_cannot_be_cleared_while_it_is_pressed(board):
     assert board.ask('enable')[1]['reason'] == 'stop'
 
 
+def test_a_pressed_stop_lets_nothing_through_in_one_pass(board):
+    """Not even commands that come at once."""
+    board.library.host_open_stop(True)
+    board.advance(6)
+    board.transmit()
+    data = b''.join(encode(kind, number, fields) for number, (kind, fields) in enumerate(
+        [('disable', {}), ('enable', {}), ('set', {'duty': 1})]))
+    board.library.host_receive(data, len(data))
+    heated = []
+    for _ in range(8):
+        board.library.host_step()
+        heated.append(board.pwm)
+    assert heated == [0] * 8
+    assert [frame.fields.get('reason') for frame in board.frames()] == [None, 'stop', 'disabled']
+
+
 def test_a_spark_on_the_stops_wire_is_no_stop(board):
     """Two milliseconds are no press."""
     enabled(board)
@@ -313,6 +364,24 @@ def test_index_pulses_latch_the_counter(board):
     assert 'latch' not in fields
 
 
+def test_index_pulses_latch_more_than_16_bits(board):
+    """Far from where it was switched on, and after more pulses than 16 bits count."""
+    board.turn(1, -1)
+    board.ask('zero')
+    count = 0
+    for _ in range(4):
+        count = board.turn(count, -20000)
+        board.advance(1)
+    for _ in range(65535):
+        board.library.host_index()
+    board.advance(1)
+    for _ in range(3):
+        board.library.host_index()
+    board.turn(count, 500)
+    fields = board.telemetry()
+    assert (fields['index'], fields['latch'], fields['counts']) == ('2', '-80000', '-79500')
+
+
 def test_edges_too_fast_to_follow_are_a_fault(board):
     """Both tracks at once: a count was lost, and nobody knows which way."""
     board.library.host_tracks(False, False)
@@ -332,6 +401,14 @@ def test_telemetry_comes_in_its_period(board):
         times = [int(frame.fields['time']) for frame in board.frames()]
         assert len(times) == (1000 // period if period else 0)
         assert {late - early for early, late in zip(times, times[1:])} <= {period}
+
+
+def test_telemetry_that_is_late_once_keeps_its_times(board):
+    """A host may count on the period."""
+    assert board.ask('config', period=100, watchdog=500)[0] == 'ok'
+    board.library.host_leap(130)
+    board.advance(170)
+    assert [int(frame.fields['time']) for frame in board.frames()] == [131, 200, 300]
 
 
 def test_a_duty_limit_is_kept(tmp_path):

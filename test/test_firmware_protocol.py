@@ -119,6 +119,8 @@ DECIMAL = re.compile(r'(-?)([0-9]{1,10})(?:\.([0-9]{1,10}))?')
 @example('4294967296')
 @example('9999999999')
 @example('0.0000000001')
+@example('0.00000000001')
+@example('00000000001')
 @example('-')
 @example('1.')
 def test_numbers(firmware_library, text):

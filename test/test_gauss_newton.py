@@ -47,11 +47,43 @@ def test_no_derivative_is_taken_that_no_step_uses():
     assert (len(looked), len(derived)) == (3, 2)
 
 
+def bend(vector):
+    """Return a residual whose Newton step from 0.3 leads to -0.7, where it is larger."""
+    return np.arctan(20.0 * vector)
+
+
+def slope_of_bend(vector):
+    """Return its derivative."""
+    return np.diag(20.0 / (1.0 + (20.0 * vector) ** 2))
+
+
+def search_bend(evaluations, tolerance=0.0):
+    """Return where a search from 0.3 ends, and where it looked."""
+    looked = []
+    found = minimise(lambda x: (looked.append(float(x[0])), bend(x))[1], slope_of_bend,
+                     np.array([0.3]), np.array([-9.0]), np.array([9.0]), evaluations, tolerance)
+    return found, looked
+
+
 def test_a_step_that_makes_it_worse_is_not_taken():
-    # Newton's step from here leads far to the other side.
-    found = minimise(lambda x: np.arctan(x), lambda x: np.diag(1.0 / (1.0 + x ** 2)),
-                     np.array([3.0]), np.array([-99.0]), np.array([99.0]), 2, 0.0)
-    assert abs(np.arctan(found[0])) <= np.arctan(3.0)
+    found, looked = search_bend(2)
+    assert looked[1] == pytest.approx(-0.7)
+    assert found == 0.3
+
+
+def test_steps_get_shorter_until_one_helps():
+    found, looked = search_bend(20)
+    assert np.all(np.diff(np.abs(np.array(looked[1:5]) - 0.3)) <= 0.0)
+    assert found == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_search_ends_with_a_step_that_gains_little_or_is_short():
+    assert len(search_bend(99, tolerance=0.9)[1]) < len(search_bend(99)[1]) < 20
+    # From 3 a step is cut to 1; of the square that takes off five ninths.
+    looked = []
+    minimise(lambda x: (looked.append(x), x)[1], lambda x: np.eye(1), np.array([3.0]),
+             np.array([-9.0]), np.array([9.0]), 99, 0.6)
+    assert len(looked) == 2
 
 
 def test_residuals_that_are_not_finite_end_the_search_where_it_is():
@@ -65,3 +97,25 @@ def test_a_step_ends_at_a_bound_and_the_others_follow():
     step = damped_step(curvature, gradient, 0.0, np.full(2, -9.0), np.array([0.2, 9.0]))
     assert step == pytest.approx([0.2, 0.05])
     assert damped_step(np.zeros((1, 1)), np.zeros(1), 1.0, -np.ones(1), np.ones(1)) == 0.0
+
+
+def test_a_step_within_bounds_is_the_best_one():
+    """Components at a bound are let go again where that helps."""
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        root, target = rng.standard_normal((4, 3)), 0.5 * rng.standard_normal(4)
+        lowest, highest = -0.3 * rng.random(3), 0.3 * rng.random(3)
+        expected = optimize.lsq_linear(root, target, (lowest, highest), tol=1e-14).x
+        found = damped_step(root.T @ root, -root.T @ target, 0.0, lowest, highest)
+        assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_step_is_no_longer_than_the_range_of_a_parameter():
+    step = damped_step(np.eye(2), np.array([-30.0, 40.0]), 0.0, np.full(2, -99.0), np.full(2, 99.0))
+    assert step == pytest.approx([0.6, -0.8])
+
+
+def test_damping_is_a_share_of_the_largest_curvature():
+    step = damped_step(np.diag([4.0, 1.0]), np.array([-0.4, -0.1]), 0.5, np.full(2, -9.0),
+                       np.full(2, 9.0))
+    assert step == pytest.approx([0.4 / 6.0, 0.1 / 3.0])

@@ -40,6 +40,18 @@ def preisach_problem(seed=0, levels=20, loads=(1.0, 2.0, 3.0, 4.5)):
     return nodes, rows, target, np.repeat(np.arange(len(loads)), len(OSCILLATION))
 
 
+@pytest.mark.parametrize('size, seed', [(5, 3236), (5, 4794), (6, 265), (6, 2206)])
+def test_the_solver_leaves_circles(size, seed):
+    """Unknowns that change sides together would do so for ever here."""
+    generator = np.random.default_rng(seed)
+    root = generator.standard_normal((size, size)) * np.exp(2 * generator.standard_normal(size))
+    gram, moment = root.T @ root, generator.standard_normal(size)
+    x, _ = solve_nonnegative(gram, moment, np.zeros(size, dtype=bool))
+    gradient = gram @ x - moment
+    assert np.all(x >= 0.0) and np.all(gradient > -1e-9 * np.abs(moment).max())
+    assert np.abs(x @ gradient) < 1e-9
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10 ** 6), st.integers(1, 25), st.floats(1e-6, 1.0))
 def test_solver_meets_the_optimality_conditions_of_scipys(seed, size, ridge):

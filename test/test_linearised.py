@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed-form evidences of linearised effects, and p values that hold for all of them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from hysteresis_ros.diagnosis.covariance import Covariance
+from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 from hysteresis_ros.diagnosis.linearised import Linearised, Start
 from hysteresis_ros.effects import catalogue
 
@@ -19,8 +22,9 @@ def make(trials, rows, seed=0):
     trial = np.repeat(np.arange(trials), rows)
     drive = np.concatenate([np.cumsum(rng.standard_normal(rows)) for _ in range(trials)])
     drive = (drive - drive.min()) / np.ptp(drive)
-    discrepancy = 1e-6 * np.exp(-0.5 * ((drive[:, None] - drive[None, :]) / 0.45) ** 2)
-    covariance = Covariance(discrepancy, 30.0 * np.arange(1.0, len(trial) + 1.0), trial, 1e-4, 0.3)
+    discrepancy = Discrepancy(np.full((len(trial), 1), 1e-3), drive[:, None] / 0.45)
+    covariance = Covariance(discrepancy, 30.0 * np.arange(1.0, len(trial) + 1.0), trial, 1e-4,
+                            np.inf, 0.3)
     starts = []
     for number in range(12):
         shape = np.cos(np.pi * (1 + number // 2) * drive + number)
@@ -68,6 +72,27 @@ def test_an_effect_that_is_there_has_the_best_evidence():
     assert max(pairs, key=lambda names: pairs[names][0]) == tuple(sorted((NAMES[2], NAMES[7])))
     singles = family.singles()
     assert max(singles, key=lambda names: singles[names][0])[0] in (NAMES[2], NAMES[7])
+
+
+def test_an_effect_makes_no_pair_with_one_that_it_replaces():
+    """A lag with two time constants contains that with one."""
+    covariance, starts = make(2, 40)
+    names = ('thermal_lag', 'heating_cooling_asymmetry', 'payload_error')
+    starts = [dataclasses.replace(start, effect=catalogue()[name]())
+              for start, name in zip(starts, names)]
+    covariance.add(covariance.start())
+    family = Linearised(covariance.points, np.zeros(80), starts)
+    assert set(family.pairs()) == {tuple(sorted((name, names[2]))) for name in names[:2]}
+
+
+def test_p_values_are_those_of_the_best_of_all_effects():
+    """A gain that is usual for the best of many is none."""
+    covariance, starts = make(2, 60)
+    point = covariance.add(covariance.start(0.1, 1.0))
+    rng = np.random.default_rng(3)
+    smallest = [min(Linearised(covariance.points, point.factor @ rng.standard_normal(120), starts)
+                    .p_values(point, rng, 60).values()) for _ in range(40)]
+    assert np.mean(smallest) > 0.35
 
 
 @pytest.mark.slow

@@ -110,10 +110,12 @@ def test_a_clean_arm_is_not_faulty_by_a_bench_of_two_loads(two_loads):
     assert found.verdict in ('adequate', 'not_excited')
 
 
-@pytest.mark.parametrize('name, factor', [('payload_mass', 100.0), ('forearm_length', 16.0)])
-def test_an_arm_whose_loads_are_of_another_order_is_refused(name, factor):
+@pytest.mark.parametrize('names, factor', [
+    (['payload_mass'], 100.0), (['forearm_length'], 16.0),
+    (['payload_mass', 'forearm_mass', 'gravity'], 0.1)])
+def test_an_arm_whose_loads_are_of_another_order_is_refused(names, factor):
     """Values that are possible by themselves, with loads that no bench of this muscle had."""
     length, force = tables()
-    arm = {**GEOMETRY, name: factor * GEOMETRY[name]}
+    arm = {**GEOMETRY, **{name: factor * GEOMETRY[name] for name in names}}
     with pytest.raises(ParameterError, match='pulls each muscle with about .* is a mass in g'):
         api.identify(length, force, geometry=arm)

@@ -9,6 +9,7 @@ from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement, settled_rows
 from hysteresis_ros.measurements.holds import holds
 from hysteresis_ros.measurements.quantities import shown, unit_of
+from hysteresis_ros.measurements.units import UNITS
 import numpy as np
 import pytest
 
@@ -191,3 +192,24 @@ def test_units_for_people():
     assert shown('angle')[1] * np.pi == pytest.approx(180.0)
     assert shown('step') == ('', 1.0)
     assert unit_of('predicted_force') == 'N' and unit_of('other') == ''
+
+
+@pytest.mark.parametrize('name, unit, written, value', [
+    ('voltage', 'mV', 1500.0, 1.5), ('supply_voltage', 'kV', 0.012, 12.0),
+    ('temperature', 'K', 300.0, 26.85), ('temperature', 'degF', 212.0, 100.0),
+    ('ambient_temperature', '°F', 32.0, 0.0), ('pressure', 'kPa', 3.0, 3e3),
+    ('pressure', 'bar', 2.0, 2e5), ('pressure', 'MPa', 0.2, 2e5), ('pressure', 'hPa', 5.0, 500.0),
+    ('pressure', 'mbar', 1013.25, 101325.0), ('pressure', 'psi', 14.5037737730, 1e5),
+    ('stress', 'MPa', 3.0, 3e6), ('stress', 'kPa', 3.0, 3e3), ('stress', 'GPa', 0.1, 1e8),
+    ('current', 'mA', 700.0, 0.7), ('current', 'uA', 7.0, 7e-6), ('power', 'mW', 3.0, 3e-3),
+    ('power', 'kW', 0.1, 100.0), ('force', 'mN', 20.0, 0.02), ('force', 'kN', 0.02, 20.0),
+    ('force', 'gf', 100.0, 0.980665), ('force', 'kgf', 1.0, 9.80665), ('length', 'mm', 7.0, 7e-3),
+    ('length', 'cm', 7.0, 0.07), ('length', 'um', 7.0, 7e-6), ('length', 'µm', 7.0, 7e-6),
+    ('length', 'nm', 7.0, 7e-9), ('strain', '%', 4.0, 0.04), ('strain', 'percent', 4.0, 0.04),
+    ('angle', 'deg', 180.0, np.pi), ('angle', '°', 90.0, np.pi / 2), ('angle', 'mrad', 5.0, 5e-3),
+    ('angle', 'degrees', 90.0, np.pi / 2), ('time', 'ms', 1500.0, 1.5), ('time', 'us', 2.0, 2e-6),
+    ('time', 'ns', 2.0, 2e-9), ('time', 'min', 2.0, 120.0), ('time', 'h', 1.0, 3600.0)])
+def test_units_become_those_of_files(name, unit, written, value):
+    """Each against a value that a person knows."""
+    found = UNITS[name][unit].convert(np.array([written]))
+    assert found == pytest.approx([value], rel=1e-9, abs=1e-12)

@@ -71,6 +71,26 @@ def test_white_noise_cannot_be_larger_than_differences_of_rows(noise):
     assert largest_noise(short) == np.inf
 
 
+def test_the_bound_on_white_noise_by_hand():
+    """Of rows that alternate on parabolas third differences say least; no trial meets another."""
+    row = np.arange(40.0)
+    trial = row ** 2 + 0.001 * (-1.0) ** row
+    run = table(np.repeat([0, 1], 40), time=np.tile(row, 2), voltage=np.zeros(80),
+                angle=np.concatenate([trial, 7.0 - trial]) / 1000.0)
+    count = 2 * (40 - 3)
+    assert largest_noise(run) == pytest.approx(
+        8e-6 / np.sqrt(20.0) * (1.0 + 3.0 / np.sqrt(2.0 * count / 3.0)))
+
+
+def test_the_bound_on_white_noise_holds_for_nothing_but_noise():
+    """In 98 of a hundred recordings of 400 rows."""
+    rng, time = np.random.default_rng(4), np.arange(400.0)
+    bounds = [largest_noise(table(np.zeros(400), time=time, voltage=time,
+                                  angle=1.0 + 0.01 * rng.standard_normal(400)))
+              for _ in range(200)]
+    assert np.mean(np.array(bounds) > 0.01) >= 0.98
+
+
 def test_repeats_show_what_differs_between_equal_trials():
     rng = np.random.default_rng(2)
     drive = np.tile(rng.uniform(0, 6, 200), 3)

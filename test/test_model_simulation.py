@@ -10,7 +10,7 @@ from scipy import optimize
 
 from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.measurements import Measurement
-from hysteresis_ros.model import LinearModel, Simulator
+from hysteresis_ros.model import LinearModel, simulation, Simulator
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.simulation import trials_of
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY, STRENGTHS, wandering_voltage
@@ -103,6 +103,17 @@ def test_many_sets_in_one_call_are_those_of_single_runs(jobs):
     for effects, rows in zip(sets, found):
         np.testing.assert_array_equal(rows, Simulator(model, run).run(effects))
     assert len(np.unique(found, axis=0)) > 20
+
+
+def test_no_more_balances_are_kept_than_asked_for(monkeypatch):
+    """Thousands of payloads must not fill the memory."""
+    monkeypatch.setattr(simulation, 'MOST_BALANCES', 3)
+    model = bicep_model()
+    simulator = Simulator(model, arm_run([1.0, 4.0]))
+    sets = [[effect_of(model, 'payload_error', dm=float(dm))] for dm in range(8)]
+    found = simulator.run_many(sets)
+    assert len(simulator._balances) <= 3
+    np.testing.assert_array_equal(found[0], Simulator(model, arm_run([1.0, 4.0])).run(sets[0]))
 
 
 def test_no_sets_are_no_rows():

@@ -60,6 +60,14 @@ def problem():
     return problem_for(model, [length.select(range(4))])
 
 
+def test_weights_are_refitted_to_what_the_models_second_stage_is_given(problem):
+    """The load counts as it does in the model, whose own weights say nearly the same."""
+    own = problem.pick([m.column('length') - problem.model.predict(m)
+                        for m in problem.measurements])
+    refitted = problem.measured - problem.simulate([])
+    assert np.std(refitted) < 1.2 * np.std(own) < 0.1 * np.std(problem.measured)
+
+
 @pytest.mark.parametrize('name, values, parameter', [
     ('stress_dependence', {'C': 0.6}, 'C'),
     ('series_compliance', {'compliance': 0.2}, 'compliance'),

@@ -151,6 +151,16 @@ def test_the_rest_of_a_line_that_began_before_anybody_listened_is_no_bad_line():
     assert [frame.sequence for frame in decoder.feed(telemetry)] == [0]
 
 
+def test_a_line_that_was_under_way_does_not_spoil_the_next():
+    """A port that is opened anew begins anew."""
+    decoder = Decoder()
+    assert decoder.feed(b'tele 1 ti') == []
+    decoder.begin()
+    frame = Frame('ok', 7, {'re': '4'})
+    assert decoder.feed(encode('ok', 7, {'re': '4'})) == [frame]
+    assert decoder.bad_lines == 0
+
+
 def test_longest_line_that_can_be_written_can_be_read():
     room = MAX_LINE - len(encode('x', 1, {'k': ''.ljust(1, 'v')})) + 1
     frame = Frame('x', 1, {'k': 'v' * room})

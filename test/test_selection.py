@@ -7,9 +7,11 @@ import dataclasses
 from model_support import bicep_model, effect_of, runs
 import numpy as np
 import pytest
+from scipy import stats
 
 from hysteresis_ros.diagnosis import events
 from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.discrepancy import sensitivity
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
@@ -166,6 +168,15 @@ def test_the_same_seed_gives_the_same_p_values(model):
     assert first != other
 
 
+def test_a_recording_that_shows_none_of_the_effects_asked_for_is_judged(model):
+    """What a lag does is gone in settled rows; that something happened may still be seen."""
+    told = diagnose(model, [recording(model)], ['thermal_lag'])
+    assert (told.missing, told.ranking, told.event) == ([], [], None)
+    assert told.not_excited == {'thermal_lag': 'every row is settled'}
+    told = diagnose(model, [recording(model, change=0.15 * (np.arange(90) >= 52))], [])
+    assert (told.verdict, told.missing) == ('unknown', []) and told.event is not None
+
+
 def test_noise_is_no_evidence_for_any_effect(model):
     """Two degrees of white noise, and no set is an answer; the model itself suffices."""
     found = selection(model, recording(model, noise=0.035))
@@ -186,6 +197,38 @@ def test_something_that_happened_once_has_its_time(model):
     assert log_posterior > best
     told = diagnose(model, [measured], ['payload_error', 'supply_sag'])
     assert (told.verdict, told.missing, told.event) == ('unknown', [], time)
+
+
+@pytest.mark.parametrize('of_length', [False, True])
+def test_an_event_has_the_evidence_of_a_column_of_unknown_size(model, of_length):
+    """Of each moment, in the angle or in the length, equally probable: by scipy."""
+    row = 40
+    gain = sensitivity(problem_for(model, [recording(model)]), [])
+    shape = gain / np.sqrt(np.mean(gain ** 2)) if of_length else np.ones(90)
+    found = selection(model, recording(model, change=0.1 * shape * (np.arange(90) >= row)), ())
+    problem, rows = found.problem, 90 - 2 * int(events.MARGIN * 90)
+    residual = problem.measured - found.base.predicted
+    moment, total = events.most_probable(problem, found)
+    assert moment == problem.clock[row]
+    best = -np.inf
+    for point in found.covariance.points:
+        log_determinant = np.sum(np.log(np.diag(point.factor)))
+        prior = point.constant + log_determinant + 45.0 * np.log(2.0 * np.pi)
+        for one in (np.ones(90), gain / np.sqrt(np.mean(gain ** 2))):
+            column = one * (np.arange(90) >= row)
+            matrix = (point.factor @ point.factor.T
+                      + np.mean(residual ** 2) * np.outer(column, column))
+            best = max(best, prior + stats.multivariate_normal(cov=matrix).logpdf(residual))
+    odds = np.log(found.settings.prior / (1.0 - found.settings.prior))
+    assert total == pytest.approx(best / found.temper + odds - np.log(2 * rows), abs=1e-6)
+
+
+def test_an_event_has_to_explain_more_than_the_base_models_own_error():
+    """A step that the bench's error could have caused is none."""
+    for rmse, happened in ((0.0001, True), (0.004, False)):
+        model = bicep_model(metrics={'length': {'verification': {'rmse': rmse}}})
+        found = selection(model, recording(model, change=0.03 * (np.arange(90) >= 40)), ())
+        assert np.isfinite(events.most_probable(found.problem, found)[1]) == happened
 
 
 def test_a_recording_without_an_event_has_none(model):

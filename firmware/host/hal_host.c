@@ -106,6 +106,11 @@ void host_advance(uint32_t milliseconds)
     }
 }
 
+void host_leap(uint32_t milliseconds)
+{
+    now += milliseconds;
+}
+
 void host_receive(const uint8_t *data, uint32_t length)
 {
     for (uint32_t i = 0; i < length && received_in - received_out < BUFFER; i++) {

@@ -11,6 +11,7 @@
 void host_start(void);                      // power on; each time is another boot
 void host_advance(uint32_t milliseconds);   // with passes of the loop in every one of them
 void host_step(void);                       // one pass, no time
+void host_leap(uint32_t milliseconds);      // time without a pass: weeks in an instant
 void host_receive(const uint8_t *data, uint32_t length);
 uint32_t host_transmit(uint8_t *data, uint32_t most);
 void host_tracks(bool a, bool b);

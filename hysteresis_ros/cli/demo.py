@@ -191,8 +191,8 @@ def target_sequences(model: MuscleModel, args: argparse.Namespace) -> Angles:
     low, high = ends.min() + margin, ends.max() - margin
     phase = 2.0 * np.pi * np.arange(args.values) / args.values * 2.0
     sinusoid = 0.5 * (low + high) + 0.5 * (high - low) * np.cos(phase)
-    chance = np.random.default_rng([args.seed, 78])
-    return {'sinusoidal': sinusoid, 'random': chance.uniform(low, high, args.values)}
+    rng = np.random.default_rng([args.seed, 78])
+    return {'sinusoidal': sinusoid, 'random': rng.uniform(low, high, args.values)}
 
 
 def drive(args: argparse.Namespace, folder: Path, sequences: Angles, model_file: AnyPath,

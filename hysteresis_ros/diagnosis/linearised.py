@@ -252,6 +252,8 @@ class Linearised:
         dict of str to float
             (1 + draws as good) / (1 + draws), so that 1 / (1 + count) is the smallest.
         """
+        if not self.starts:
+            return {}
         draws = point.factor @ rng.standard_normal((len(point.factor), count))
         alone = np.arange(len(self.starts))[:, None]
         derivatives, _ = self._places(alone)

@@ -22,9 +22,8 @@ from hysteresis_ros.model.simulation import Simulator
 if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
 
-# A long recording is judged on about this many rows; between them nothing new is learned. Weights
-# that are refitted again and again ask for fewer.
-MOST_ROWS = {'arm': 400, 'bench': 400}
+# A long recording is judged on about this many rows; between them nothing new is learned.
+MOST_ROWS = 400
 MOST_FOLDS = 4
 # Blocks for significance: about this many a recording.
 BLOCKS = 24
@@ -69,7 +68,7 @@ class Problem:
         self.response = measurements[0].response
         self.settled = all(m.settled for m in measurements)
         rows = sum(m.rows for m in measurements)
-        self.stride = max(1, rows // MOST_ROWS[self.kind])
+        self.stride = max(1, rows // MOST_ROWS)
         self.simulators = [Simulator(model, m) for m in measurements]
         self.chosen = [np.arange(0, m.rows, self.stride) for m in measurements]
         self.measured = self.pick([m.column(m.response) for m in measurements])

@@ -27,7 +27,7 @@ class Settings:
         because the arm goes other ways than the bench: a third.
     correlation : float
         Shortest length over which the discrepancy changes, as a share of the range of drive and
-        response: about two cells of the bench's grid of weights.
+        response: about one cell of the bench's grid of weights.
     practical : float
         Smallest reduction of the RMSE that matters to a user.
     form : float

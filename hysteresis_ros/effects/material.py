@@ -47,7 +47,7 @@ class StressDependence(MaterialEffect):
             surroundings = Surroundings(1.0, 1.0, 1.0, 1.0)
         scale = (surroundings.load or 1.0) / (surroundings.full_drive_squared or 1.0)
         unit, low, high = cls.RANGES.get((surroundings.drive, surroundings.load_name),
-                                         ('load/heat', 1e-3 * scale, 1e3 * scale))
+                                         ('load/drive squared', 1e-3 * scale, 1e3 * scale))
         starts = tuple(float(value) for value in np.geomspace(low, high, 5)[1:-1])
         return (Parameter('C', unit,
                           'load that shifts the transformation by one unit of drive squared',
