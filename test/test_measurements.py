@@ -8,7 +8,7 @@ from hypothesis import given, settings, strategies
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement, settled_rows
 from hysteresis_ros.measurements.holds import holds
-from hysteresis_ros.measurements.quantities import shown, unit_of
+from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.measurements.units import UNITS
 import numpy as np
 import pytest
@@ -191,7 +191,6 @@ def test_units_for_people():
     assert shown('length') == ('mm', 1000.0)
     assert shown('angle')[1] * np.pi == pytest.approx(180.0)
     assert shown('step') == ('', 1.0)
-    assert unit_of('predicted_force') == 'N' and unit_of('other') == ''
 
 
 @pytest.mark.parametrize('name, unit, written, value', [

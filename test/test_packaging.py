@@ -296,12 +296,6 @@ def constraints(path):
     return [Requirement(line) for line in lines if line]
 
 
-def test_the_newest_set_has_the_bounds_of_setup(root, description):
-    """The constraints file for the newest versions adds nothing of its own."""
-    newest = {str(line) for line in constraints(root / 'constraints/newest.txt')}
-    assert newest == {str(Requirement(line)) for line in description.install_requires}
-
-
 def test_ubuntus_set_is_within_the_bounds_of_setup(root, description):
     """All that the package needs to run is pinned, to versions that setup.py allows."""
     pins = {}

@@ -173,11 +173,9 @@ class Fitter:
         self.covariance = covariance
         self.discrepancy = discrepancy
         self.fixed = list(problem.model.effects)
-        self.simulations = 0
 
     def simulate(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
         """Return the responses (len(sets), n) with sets of effects added to the model's own."""
-        self.simulations += len(sets)
         with np.errstate(all='ignore'):
             return self.problem.simulate_many(
                 [[*unaffected(self.fixed, effects), *effects] for effects in sets])

@@ -168,7 +168,7 @@ def largest_noise(measurement: Measurement) -> float:
     Returns
     -------
     float
-        With three standard errors; infinite for fewer than ten differences.
+        With three standard errors of the mean square; infinite where these are all of it.
 
     """
     values = measurement.column(measurement.response)
@@ -176,10 +176,14 @@ def largest_noise(measurement: Measurement) -> float:
     bounds = [np.inf]
     for order in range(1, 5):
         differences = np.concatenate([np.diff(one, order) for one in trials])
-        if differences.size >= 10:
-            size = np.sqrt(np.mean(differences ** 2) / math.comb(2 * order, order))
-            # Neighbouring differences are correlated: about one in `order` counts.
-            bounds.append(size * (1.0 + 3.0 / np.sqrt(2.0 * differences.size / order)))
+        if not differences.size:
+            continue
+        # Neighbouring differences are correlated, so that of so many one counts.
+        share = math.comb(4 * order, 2 * order) / math.comb(2 * order, order) ** 2
+        least = 1.0 - 3.0 * math.sqrt(2.0 * share / differences.size)
+        if least > 0.0:
+            variance = np.mean(differences ** 2) / math.comb(2 * order, order)
+            bounds.append(math.sqrt(variance / least))
     return float(min(bounds))
 
 

@@ -53,18 +53,6 @@ QUANTITIES = {
 }
 
 
-def unit_of(name: str) -> str:
-    """
-    Return a column's unit in files, '' if it is not known.
-
-    A `predicted_` or `reference_` in front of the name does not change the unit.
-    """
-    for prefix in ('predicted_', 'reference_'):
-        name = name.removeprefix(prefix)
-    quantity = QUANTITIES.get(name)
-    return quantity.unit if quantity else ''
-
-
 def shown(name: str) -> tuple[str, float]:
     """
     Return the unit for people and the factor to it.
