@@ -172,6 +172,7 @@ def test_a_recording_that_shows_none_of_the_effects_asked_for_is_judged(model):
     """What a lag does is gone in settled rows; that something happened may still be seen."""
     told = diagnose(model, [recording(model)], ['thermal_lag'])
     assert (told.missing, told.ranking, told.event) == ([], [], None)
+    assert told.verdict == 'not_excited'
     assert told.not_excited == {'thermal_lag': 'every row is settled'}
     told = diagnose(model, [recording(model, change=0.15 * (np.arange(90) >= 52))], [])
     assert (told.verdict, told.missing) == ('unknown', []) and told.event is not None

@@ -148,8 +148,8 @@ class _Verdict:
     def _known(self, chosen: frozenset[str], unobservable: Collection[str]) -> str:
         if chosen:
             return 'missing'
-        names = self.selection.names
-        count = sum(name in unobservable for name in names)
+        names = {*self.selection.names, *self.selection.unobservable}
+        count = len(names.intersection(unobservable))
         drive = self.problem.signals.get('drive', np.zeros(1))
         still = np.ptp(drive) < LEAST_DRIVE * self.problem.model.drive_range
         if still or count > MOST_UNOBSERVABLE * max(len(names), 1):
