@@ -35,11 +35,11 @@ def test_restart_is_noticed_and_time_goes_on():
 
 
 def test_stamps_of_a_real_board_take_the_jitter_out():
-    stamps, chance = RealStamps(), random.Random(1)
+    stamps, rng = RealStamps(), random.Random(1)
     errors = []
     for i in range(1, 2000):
         time = 0.1 * i
-        late = 0.002 + chance.expovariate(100.0)
+        late = 0.002 + rng.expovariate(100.0)
         stamp = stamps.stamp(time, 1000.0 + 1.0001 * time + late)
         assert stamp <= 1000.0 + 1.0001 * time + late + 1e-9
         errors.append(stamp - (1000.0 + 1.0001 * time))

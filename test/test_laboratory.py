@@ -349,11 +349,11 @@ def test_encoder_resolution():
 
 def test_bench_instruments():
     """The position sensor counts in 0.04 mm; the load cell is good to a tenth of a percent."""
-    chance = np.random.default_rng(0)
-    readings = np.array([position_sensor(3.14e-3, chance) for _ in range(200)])
+    rng = np.random.default_rng(0)
+    readings = np.array([position_sensor(3.14e-3, rng) for _ in range(200)])
     np.testing.assert_allclose(readings / LENGTH_RESOLUTION, np.round(readings / 4e-5), atol=1e-9)
     assert np.mean(readings) == pytest.approx(3.14e-3, abs=1e-5)
-    forces = np.array([load_cell(7.0, chance) for _ in range(2000)])
+    forces = np.array([load_cell(7.0, rng) for _ in range(2000)])
     assert np.std(forces) == pytest.approx(0.001 * 15.0, rel=0.1)
 
 

@@ -34,16 +34,16 @@ def test_step_sequences(kind):
 
 def test_continuous_sequences():
     """Fast and slow steps, ramps of all rates, the same loop again, holds of over 100 s."""
-    chance = np.random.default_rng(3)
-    steps = sequences.steps_of_all_speeds(chance)
+    rng = np.random.default_rng(3)
+    steps = sequences.steps_of_all_speeds(rng)
     holds = np.diff(np.flatnonzero(np.diff(steps)))
     assert holds.min() < 25 and holds.max() > 100
-    rates = np.abs(np.diff(sequences.ramps(chance))) / sequences.SAMPLING
+    rates = np.abs(np.diff(sequences.ramps(rng))) / sequences.SAMPLING
     assert np.any((rates > 0.03) & (rates < 0.1)) and np.any(rates > 0.8)
-    loop = sequences.repeated_loop(chance)
+    loop = sequences.repeated_loop(rng)
     period = (len(loop) - 40) // 6
     np.testing.assert_array_equal(loop[40:40 + period], loop[-period:])
-    holding = sequences.long_holds(chance)
+    holding = sequences.long_holds(rng)
     edges = np.flatnonzero(np.diff(holding))
     assert edges[0] >= 1000 and len(holding) - edges[-1] >= 1000
 

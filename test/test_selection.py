@@ -105,7 +105,7 @@ def test_two_effects_behind_one_are_found_as_a_pair(model):
 
 
 def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
-    """A fan is a sag to an arm at rest; with the values beside it the sag itself is found."""
+    """A fan is a sag to an arm at rest; in its place the sag itself is found."""
     model = bicep_model(metrics={'length': {'verification': {'rmse': 0.0001}}})
     planted = frozenset(['payload_error', 'supply_sag'])
     found = selection(model, recording(model, [

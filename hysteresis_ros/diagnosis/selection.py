@@ -232,8 +232,8 @@ class Selection:
         """
         Exchange single effects of the answer for others, until no other set is more probable.
 
-        What the others begin with are the values beside the effect that they replace. Where a set
-        is grown from a smaller one, they are those of the smaller set, which may be far away.
+        The other effects start at their values in the answer. Where a set is grown from a smaller
+        one they start at their values in that, which may be far away.
         """
         for _ in range(self.settings.most_effects):
             names = next(iter(self.valid()), frozenset())
