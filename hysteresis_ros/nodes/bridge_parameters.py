@@ -24,7 +24,8 @@ BOARD = (
     Spec('telemetry_timeout', 1.0, 'Time without telemetry after which the board counts as lost; '
          'by the slower clock', 's', 0.05, 600.0, read_only=True),
     Spec('board_watchdog', 1.0, 'Time without a word from this node after which the board '
-         'switches off on its own; by the slower clock', 's', 0.3, 60.0, read_only=True),
+         'switches off on its own, by the slower clock; a board may do so earlier, that of '
+         'firmware/ after 0.5 s', 's', 0.3, 60.0, read_only=True),
 )
 
 OUTPUT = (
