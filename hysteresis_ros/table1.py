@@ -114,8 +114,8 @@ def experiment(seed: int, effects: Sequence[str] | None = (), jobs: int = 1,
     Returns
     -------
     dict
-        ``rows``: for each row of the muscle and each method ``{'mean', 'std'}``; ``effects``: what was
-        added; ``baselines``; ``seed``.
+        ``rows``: for each row of the muscle and each method ``{'mean', 'std'}``; ``effects``: what
+        was added; ``baselines``; ``seed``.
     """
     tables = bench_tables({}, seed, muscle)
     force = Measurement.from_columns(tables['force.csv'])
