@@ -23,9 +23,10 @@ from hysteresis_ros.identification.baselines import (
     fit_additive, fit_embedded_line, fit_one_load, simulate)
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.diagnosis.bench_effects import add_effects
-from hysteresis_ros.laboratory.experiments import LOADS, bench_tables
+from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
-from hysteresis_ros.laboratory.plant import Plant
+from hysteresis_ros.laboratory.plant import bench_of, Plant, SOFT_MUSCLES
+from hysteresis_ros.laboratory.soft_bench import SoftBench
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.workers import one_blas_thread
 
@@ -41,16 +42,17 @@ PAPER = {
     'linear': ((2.2, 1.7), (2.7, 1.7), (2.1, 1.5), (14.1, 9.9), (12.6, 9.9), (11.5, 9.5),
                (3.4, 1.7), (4.2, 2.9)),
 }
-FORCE_TRIALS, LENGTH_TRIALS = (0,), tuple(range(len(LOADS)))
+FORCE_TRIALS, LENGTH_TRIALS = (0,), (0, 1, 2, 3)
 FORCE_STEPS, LENGTH_STEPS, ARM_STEPS = 74, 30, 40
 # References stay inside what the bench and the arm have shown by this share of it at both ends.
 MARGIN = 0.02
-# The load of Fig. 9.
-ONE_LOAD = LOADS.index(3.136)
+# The trial under the load of Fig. 9, the second.
+ONE_LOAD = 1
 
 
 @one_blas_thread()
-def table1(seeds: Iterable[int], effects: Sequence[str] | None = (), jobs: int = 1) -> dict:
+def table1(seeds: Iterable[int], effects: Sequence[str] | None = (), jobs: int = 1,
+           muscle: str = 'grains') -> dict:
     """
     Carry the experiment out on several specimens.
 
@@ -63,6 +65,8 @@ def table1(seeds: Iterable[int], effects: Sequence[str] | None = (), jobs: int =
         adds those that the bench tables prove.
     jobs : int
         Processes for the search of effects.
+    muscle : str
+        What is on the bench: grains, brinson, lagoudas, mckibben or scp.
 
     Returns
     -------
@@ -70,20 +74,29 @@ def table1(seeds: Iterable[int], effects: Sequence[str] | None = (), jobs: int =
         ``rows``: for each of `ROWS` its unit, and for each method (two-stage, linear, and
         two-stage with effects) the mean over the seeds of mean error and standard deviation
         (Eqs. 23 and 24), beside the paper's; ``seeds``: the same for each specimen;
-        ``baselines``: mean errors of the models of Sec. III-B and Fig. 9.
+        ``baselines``: mean errors of the models of Sec. III-B and Fig. 9; ``muscle``. A muscle
+        that is no wire has neither the arm's rows nor numbers of the paper.
     """
-    single = [experiment(seed, effects, jobs) for seed in seeds]
+    single = [experiment(seed, effects, jobs, muscle) for seed in seeds]
     if not single:
         raise ParameterError('table1: no specimen; give at least one seed')
     rows = []
-    for k, name in enumerate(ROWS):
+    papers = {} if muscle in SOFT_MUSCLES else PAPER
+    for k, name in enumerate(rows_of(muscle)):
         ours = {method: {key: float(np.mean([one['rows'][k][method][key] for one in single]))
                          for key in ('mean', 'std')} for method in single[0]['rows'][k]}
-        paper = {method: dict(zip(('mean', 'std'), PAPER[method][k])) for method in PAPER}
+        paper = {method: dict(zip(('mean', 'std'), papers[method][k])) for method in papers}
         rows.append({'name': name, 'unit': unit(name), 'paper': paper, 'ours': ours})
     baselines = {name: {part: float(np.mean([one['baselines'][name][part] for one in single]))
                         for part in values} for name, values in single[0]['baselines'].items()}
-    return {'rows': rows, 'baselines': baselines, 'seeds': single}
+    return {'rows': rows, 'baselines': baselines, 'seeds': single, 'muscle': muscle}
+
+
+def rows_of(muscle: str) -> tuple[str, ...]:
+    """Return the rows of Table I that there are for a muscle: only wires drive an arm."""
+    if muscle in SOFT_MUSCLES:
+        return tuple(row for row in ROWS if not row.startswith('arm'))
+    return ROWS
 
 
 def unit(row: str) -> str:
@@ -91,20 +104,23 @@ def unit(row: str) -> str:
     return 'deg' if row.startswith('arm') else '%'
 
 
-def experiment(seed: int, effects: Sequence[str] | None = (), jobs: int = 1) -> dict:
+def experiment(seed: int, effects: Sequence[str] | None = (), jobs: int = 1,
+               muscle: str = 'grains') -> dict:
     """
     Carry the experiment out on one specimen.
 
     Returns
     -------
     dict
-        ``rows``: for each of `ROWS` and each method ``{'mean', 'std'}``; ``effects``: what was
-        added; ``baselines``; ``seed``.
+        ``rows``: for each row of the muscle and each method ``{'mean', 'std'}``; ``effects``: what
+        was added; ``baselines``; ``seed``.
     """
-    tables = bench_tables({}, seed)
+    tables = bench_tables({}, seed, muscle)
     force = Measurement.from_columns(tables['force.csv'])
     length = Measurement.from_columns(tables['length.csv'])
-    geometry = BicepGeometry.from_mapping(GEOMETRY, 'laboratory')
+    geometry = None
+    if muscle not in SOFT_MUSCLES:
+        geometry = BicepGeometry.from_mapping(GEOMETRY, 'laboratory')
     model = identify(length, force, force_trials=FORCE_TRIALS, length_trials=LENGTH_TRIALS,
                      geometry=geometry).model
     methods = {'two-stage': (model, 'preisach'), 'linear': (model, 'linear')}
@@ -113,9 +129,9 @@ def experiment(seed: int, effects: Sequence[str] | None = (), jobs: int = 1) -> 
         extended, added = add_effects(model, length, force, effects, LENGTH_TRIALS, FORCE_TRIALS,
                                       jobs=jobs)
         methods['with effects'] = (extended, 'preisach')
-    rows: list[dict[str, dict[str, float]]] = [{} for _ in ROWS]
+    rows: list[dict[str, dict[str, float]]] = [{} for _ in rows_of(muscle)]
     for method, (with_model, kind) in methods.items():
-        plant = Plant(seed, recording=1)
+        plant = bench_of(seed, recording=1, muscle=muscle)
         for k, (residual, span) in enumerate(residuals(
                 plant, with_model, kind, force, length, np.random.default_rng([seed, 31]))):
             found = errors(residual, span)
@@ -124,8 +140,8 @@ def experiment(seed: int, effects: Sequence[str] | None = (), jobs: int = 1) -> 
             'baselines': baselines(force, length)}
 
 
-def residuals(plant: Plant, model: MuscleModel, method: str, force: Measurement,
-              length: Measurement,
+def residuals(plant: Plant | SoftBench, model: MuscleModel, method: str,
+              force: Measurement, length: Measurement,
               rng: np.random.Generator) -> Iterator[tuple[np.ndarray, float]]:
     """
     Yield residual and output range for each row of Table I.
@@ -145,10 +161,12 @@ def residuals(plant: Plant, model: MuscleModel, method: str, force: Measurement,
             yield plant.force_trial(inverse.forces(wanted)) - wanted, span
         else:
             parts = []
-            for trial, load in zip(LENGTH_TRIALS, LOADS):
+            for trial, load in zip(LENGTH_TRIALS, plant.material.loads):
                 wanted = inside(measured[table.column('trial') == trial], LENGTH_STEPS, rng)
                 parts.append(plant.length_trial(inverse.lengths(wanted, load), load) - wanted)
             yield np.concatenate(parts), span
+    if isinstance(plant, SoftBench):
+        return
     # Where the arm can be: no voltage, and the highest.
     ends = plant.arm_trial([0.0, inverse.limits[1]])['angle']
     turn = np.arange(1, ARM_STEPS + 1) / ARM_STEPS

@@ -24,6 +24,9 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     parser.add_argument('--effects', default='none', metavar='none|auto|A,B',
                         help='also the two-stage model with effects: those that the bench proves '
                         '(auto), or those named (default: none)')
+    parser.add_argument('--muscle', default='grains', metavar='MODEL',
+                        help='grains (default), brinson, lagoudas, or a muscle that is no wire, '
+                        'and has no arm: mckibben, scp')
     parser.add_argument('--jobs', type=count, default=1, metavar='N',
                         help='processes for the search of effects (default: 1)')
     add_json(parser)
@@ -51,7 +54,7 @@ def run(args: argparse.Namespace) -> None:
 
     effects = {'none': (), 'auto': None}.get(args.effects, args.effects.split(','))
     seeds = range(args.first_seed, args.first_seed + args.seeds)
-    result = table1(progress(seeds, 'specimens'), effects, args.jobs)
+    result = table1(progress(seeds, 'specimens'), effects, args.jobs, args.muscle)
     say(args, report(result))
     if args.json:
         write_json(args.json, result)
@@ -74,7 +77,9 @@ def report(result: Mapping[str, Any]) -> str:
     from hysteresis_ros.comparison.compare import layout
 
     methods = list(result['rows'][0]['ours'])
-    lines = [f'Table I of the paper and of {len(result["seeds"])} specimens of the laboratory: '
+    paper = 'the paper and of ' if result['rows'][0]['paper'] else ''
+    kind = '' if result['muscle'] == 'grains' else f' ({result["muscle"]})'
+    lines = [f'Table I of {paper}{len(result["seeds"])} specimens of the laboratory{kind}: '
              'mean error (standard deviation)']
     rows = [['', *(f'paper, {HEADERS[method]}' for method in result['rows'][0]['paper']),
              *(f'ours, {HEADERS[method]}' for method in methods)]]

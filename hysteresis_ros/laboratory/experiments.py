@@ -5,7 +5,8 @@ Whole experiments, written as the tables that a user would have. None says what 
 
 ============== =====================================================================================
 bench          force.csv: trial 0 the damped oscillation, trial 1 random; length.csv: trials 0 to 3
-               the damped oscillation under four loads, trials 4 to 7 random; geometry.yaml
+               the damped oscillation under four loads, trials 4 to 7 random; geometry.yaml, where
+               the muscle is a wire
 arm-steps      train.csv, test.csv: sinusoid, random, staircase, ramps, each step held for 30 s
 arm-dynamic    train.csv, test.csv: steps, ramps, a repeated loop and long holds, sampled at 10 Hz
 ============== =====================================================================================
@@ -22,12 +23,13 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import sequences
 from hysteresis_ros.laboratory.bench import HOLD
 from hysteresis_ros.laboratory.linkage import GEOMETRY
-from hysteresis_ros.laboratory.plant import BRISK, Plant
+from hysteresis_ros.laboratory.plant import bench_of, BRISK, MUSCLES, Plant
+from hysteresis_ros.laboratory.wire import Material
 from hysteresis_ros.measurements.csv import write_csv
 from hysteresis_ros.spelling import unknown
 
-# Weights on the bench [N]: 20 g of magnet and hooks with 100, 300, 500 and 700 g, at 9.8 m/s^2.
-LOADS = (1.176, 3.136, 5.096, 7.056)
+# Weights on the bench with a wire [N].
+LOADS = Material.loads
 FORCE_STEPS, LENGTH_STEPS = 74, 51
 ARM_STEPS = 60
 GEOMETRY_FILE = 'geometry.yaml'
@@ -38,21 +40,23 @@ Table = dict[str, np.ndarray]
 def bench_tables(effects: Mapping[str, float], seed: int,
                  muscle: str = 'grains') -> dict[str, Table]:
     """Return the tables of the bench, by file name."""
-    plant = Plant(seed, effects, muscle=muscle)
+    bench = bench_of(seed, effects, muscle=muscle)
+    material = bench.material
+    name, scale = material.drive, material.highest_drive / sequences.HIGHEST
     rng = np.random.default_rng([seed, 21])
-    oscillation = sequences.damped_oscillation()
+    oscillation = scale * sequences.damped_oscillation()
     force, length = [], []
-    for voltage in (oscillation, sequences.random_steps(FORCE_STEPS, rng)):
-        force.append({'step': np.arange(len(voltage)), 'voltage': voltage,
-                      'force': plant.force_trial(voltage)})
+    for drive in (oscillation, scale * sequences.random_steps(FORCE_STEPS, rng)):
+        force.append({'step': np.arange(len(drive)), name: drive,
+                      'force': bench.force_trial(drive)})
     for random in (False, True):
-        for load in LOADS:
-            voltage = sequences.random_steps(LENGTH_STEPS, rng) if random else oscillation
-            length.append({'step': np.arange(len(voltage)), 'voltage': voltage,
-                           'force': np.full(len(voltage), load),
-                           'length': plant.length_trial(voltage, load)})
-    return {'force.csv': _stack(force, ['trial', 'step', 'voltage', 'force']),
-            'length.csv': _stack(length, ['trial', 'step', 'voltage', 'force', 'length'])}
+        for load in material.loads:
+            drive = scale * sequences.random_steps(LENGTH_STEPS, rng) if random else oscillation
+            length.append({'step': np.arange(len(drive)), name: drive,
+                           'force': np.full(len(drive), load),
+                           'length': bench.length_trial(drive, load)})
+    return {'force.csv': _stack(force, ['trial', 'step', name, 'force']),
+            'length.csv': _stack(length, ['trial', 'step', name, 'force', 'length'])}
 
 
 def arm_step_tables(effects: Mapping[str, float], seed: int,
@@ -93,7 +97,7 @@ def _recordings(record: Callable[[int], list[Table]]) -> dict[str, Table]:
 
 
 def _stack(trials: list[Table], columns: list[str]) -> Table:
-    trials = [{'trial': np.full(len(table['voltage']), number), **table}
+    trials = [{'trial': np.full(len(next(iter(table.values()))), number), **table}
               for number, table in enumerate(trials)]
     return {name: np.concatenate([table[name] for table in trials]) for name in columns}
 
@@ -116,7 +120,8 @@ def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
     seed : int
         Of specimen, noise and random sequences.
     muscle : str
-        Constitutive model of the wires: grains, brinson or lagoudas.
+        Constitutive model of the wires: grains, brinson or lagoudas; for the bench also a muscle
+        that is no wire: mckibben or scp.
 
     Returns
     -------
@@ -165,7 +170,7 @@ def write_experiment(name: str, directory: AnyPath, effects: Mapping[str, float]
     for file, columns in tables.items():
         write_csv(_printable(columns), folder / file)
     files = [folder / file for file in tables]
-    if name == 'bench':
+    if name == 'bench' and muscle in MUSCLES:
         files.append(folder / GEOMETRY_FILE)
         write_text(files[-1], yaml.safe_dump(GEOMETRY, sort_keys=False))
     return files

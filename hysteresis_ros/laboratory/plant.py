@@ -32,6 +32,9 @@ from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.heat import HeatBalance
 from hysteresis_ros.laboratory.hidden_physics import apply_effects
 from hysteresis_ros.laboratory.lagoudas import LagoudasMaterial
+from hysteresis_ros.laboratory.mckibben import McKibbenMaterial
+from hysteresis_ros.laboratory.scp import ScpMaterial
+from hysteresis_ros.laboratory.soft_bench import SoftBench
 from hysteresis_ros.laboratory.wire import Material
 from hysteresis_ros.spelling import unknown
 
@@ -42,6 +45,8 @@ if TYPE_CHECKING:
 PAPER, BRISK = 5.0, 0.02
 # Constitutive models of the wire.
 MUSCLES = {kind.name: kind for kind in (GrainMaterial, BrinsonMaterial, LagoudasMaterial)}
+# Muscles that are no wires; they are on the bench only.
+SOFT_MUSCLES = {kind.name: kind for kind in (McKibbenMaterial, ScpMaterial)}
 
 
 def specimen(seed: int, muscle: str = 'grains') -> Material:
@@ -58,11 +63,48 @@ def specimen(seed: int, muscle: str = 'grains') -> Material:
     Raises
     ------
     ParameterError
-        For a muscle that does not exist.
+        For a muscle that does not exist, or is no wire.
     """
+    if muscle in SOFT_MUSCLES:
+        raise ParameterError(f'laboratory: a {muscle} muscle is on the bench only; the arm is '
+                             f'driven by shape memory wires: choose one of {", ".join(MUSCLES)}')
     if muscle not in MUSCLES:
         raise ParameterError(f'laboratory: {unknown("muscle", muscle, MUSCLES)}')
     return MUSCLES[muscle].specimen(np.random.default_rng([seed, 101]))
+
+
+def bench_of(seed: int, effects: Mapping[str, float] | None = None, recording: int = 0,
+             muscle: str = 'grains') -> Plant | SoftBench:
+    """
+    Return a bench with a muscle of any kind; with a wire, its arm comes along.
+
+    Parameters
+    ----------
+    seed : int
+        Of the specimen and of all noise.
+    effects : mapping of str to float
+        Strengths of hidden effects, see `Plant`; for wires only.
+    recording : int
+        Which recording of the same specimen: another one has other noise.
+    muscle : str
+        A key of `MUSCLES` or `SOFT_MUSCLES`.
+
+    Raises
+    ------
+    ParameterError
+        For a muscle or an effect that does not exist, or an effect that the muscle cannot have.
+    """
+    if muscle in SOFT_MUSCLES:
+        if effects:
+            raise ParameterError(f'laboratory: a {muscle} muscle cannot have {next(iter(effects))}:'
+                                 ' the effects are those of shape memory wires; choose one of '
+                                 f'{", ".join(MUSCLES)}')
+        material = SOFT_MUSCLES[muscle].specimen(np.random.default_rng([seed, 101]))
+        return SoftBench(material, seed=[seed, recording, 11])
+    if muscle not in MUSCLES:
+        every = [*MUSCLES, *SOFT_MUSCLES]
+        raise ParameterError(f'laboratory: {unknown("muscle", muscle, every)}')
+    return Plant(seed, effects, recording=recording, muscle=muscle)
 
 
 class Plant:

@@ -29,9 +29,9 @@ def counted_angle(counts: int) -> float:
     return (counts + 0.5) * COUNT
 
 
-def load_cell(force: float, rng: np.random.Generator) -> float:
-    """Return the load cell's reading of a force [N]."""
-    return force + FORCE_NOISE * rng.standard_normal()
+def load_cell(force: float, rng: np.random.Generator, noise: float = FORCE_NOISE) -> float:
+    """Return the load cell's reading of a force [N], with noise of a standard deviation [N]."""
+    return force + noise * rng.standard_normal()
 
 
 def position_sensor(length: float, rng: np.random.Generator) -> float:

@@ -42,9 +42,15 @@ class Material(abc.ABC):
         finite where the strain depends on the tension at which the martensite has formed.
     arm_range : tuple of float
         About where an arm of such wires stands without voltage and at 6 V [deg].
+    drive, highest_drive, loads : str, float, tuple of float
+        What is applied on the bench, at most how much [V], and the weights there [N]: 20 g of
+        magnet and hooks with 100, 300, 500 and 700 g, at 9.8 m/s^2.
     """
 
     name: ClassVar[str]
+    drive: ClassVar[str] = 'voltage'
+    highest_drive: ClassVar[float] = 6.0
+    loads: ClassVar[tuple[float, ...]] = (1.176, 3.136, 5.096, 7.056)
     temperature_step: ClassVar[float] = math.inf
     arm_range: ClassVar[tuple[float, float]]
     resting_length: float
