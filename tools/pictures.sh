@@ -2,9 +2,10 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Draw the pictures of docs/ and of the README: pictures.sh HYSTERESIS PYTHON FOLDER.
-# Called by the Makefile; the demos write into FOLDER, and what they print goes to docs/*.png's
-# neighbours in the text by hand: the mean errors stand in the pictures, too.
+# Draws the pictures of docs/ and of the README anew: pictures.sh HYSTERESIS PYTHON FOLDER.
+#
+# `make pictures` calls it. FOLDER takes all that the demos write. The mean errors are printed in the
+# pictures; README.md and docs/results.md repeat them, and are brought up to date by hand.
 
 set -eu
 hysteresis=$1 python=$2 folder=$3
