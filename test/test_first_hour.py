@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What docs/first_hour.md tells a person to type exists, and its times and numbers are the code's."""
+"""What docs/first_hour.md tells a person to type exists; its times and numbers are the code's."""
 
 import os
 import re
@@ -54,7 +54,7 @@ def test_the_command_line_takes_every_command_of_the_page(page):
     """Options, protocols and effects are as they are written there."""
     typed = commands(page, 'hysteresis')
     assert {words[0] for words in typed} == {
-        'simulate', 'identify', 'compare', 'diagnose', 'extend', 'columns'}
+        'simulate', 'identify', 'compare', 'diagnose', 'extend', 'columns', 'effects'}
     for words in typed:
         args = build_parser(words).parse_args(words)
         for name in getattr(args, 'add', None) or []:
