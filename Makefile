@@ -51,7 +51,7 @@ IN_WORKSPACE := export PATH="$$PWD/$(VENV)/bin:$$PATH"; \
 	. ./$(WORKSPACE)/install/local_setup.sh; \
 	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)"
 
-.PHONY: help build demo test benchmark hidden docs firmware clean force
+.PHONY: help build demo test benchmark hidden docs pictures firmware clean force
 
 help:
 	@echo 'make demo       the whole system on the simulated arm: identify, drive, record, compare'
@@ -59,6 +59,7 @@ help:
 	@echo 'make benchmark  speed and accuracy, into benchmark.json'
 	@echo 'make hidden     the hidden-effect grid, into hidden.json'
 	@echo 'make docs       the pages of docs/ with the programming interface, into build/docs'
+	@echo 'make pictures   the pictures of docs/ and of the README, made anew'
 	@echo 'make firmware   machine code for the board, see firmware/README.md'
 	@echo 'make build      the workspace alone; make demo builds it, too'
 	@echo 'make clean      remove all that make made'
@@ -109,6 +110,11 @@ docs: $(VENV)/made
 	@$(VENV)/bin/python -m sphinx -q -W --keep-going -b html \
 		-d $(WORKSPACE)/build/doctrees docs $(WORKSPACE)/build/docs
 	@echo '$(WORKSPACE)/build/docs/index.html'
+
+# The numbers in the pictures are those of this run.
+pictures: build
+	@$(IN_WORKSPACE) tools/pictures.sh $(PREFIX)/lib/hysteresis_ros/hysteresis \
+		$(VENV)/bin/python $(WORKSPACE)/build/pictures
 
 firmware:
 	@$(MAKE) -s -C firmware all

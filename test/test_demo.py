@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 
+from hysteresis_ros.cli.demo import draw, Pace
 from hysteresis_ros.cli.main import main
 from hysteresis_ros.measurements import read_measurement
 
@@ -96,3 +97,19 @@ def test_numbers_out_of_range_are_refused(tmp_path, capsys, option, value):
     """Before anything is written."""
     assert option in refused(capsys, '-o', str(tmp_path / 'demo'), option, value)
     assert not (tmp_path / 'demo').exists()
+
+
+def test_the_picture_has_the_mean_errors_printed_in_it(tmp_path, monkeypatch):
+    """Of each model and each sequence."""
+    figures = []
+    monkeypatch.setattr('hysteresis_ros.report.drawing.png',
+                        lambda figure: figures.append(figure) or b'')
+    targets = {'sinusoidal': np.radians([100.0, 120.0]), 'random': np.radians([110.0, 105.0])}
+    runs, linear, again = ({name: angles + np.radians(error) * np.array([1.0, -1.0])
+                            for name, angles in targets.items()} for error in (1.5, 7.0, 0.25))
+    draw(tmp_path / 'demo.png', targets, runs, linear, again, Pace(30.0, 60.0, True))
+    for axes in figures[0].axes[2:]:
+        legend = axes.get_legend()
+        assert legend.get_title().get_text() == 'mean error'
+        assert [text.get_text() for text in legend.get_texts()] == [
+            '7.00 deg', '1.50 deg', '0.25 deg']

@@ -66,23 +66,6 @@ def test_the_commands_of_the_readme_work_one_after_the_other(
                        'diagnosis.html', 'extended.html'}
 
 
-def test_the_notebook_of_the_readme_goes_from_the_bench_to_the_extended_model(
-        readme, tmp_path, monkeypatch):
-    """Its code runs on the measurements of the commands above it."""
-    monkeypatch.chdir(tmp_path)
-    for command in lines_of(readme, 'hysteresis'):
-        if command[1] == 'simulate':
-            assert main(command[1:]) == 0
-    code, = (block for block in blocks(readme, 'python') if 'import hysteresis_ros as hr' in block)
-    names = {}
-    exec(code.replace("'auto'", repr(EFFECTS)), names)
-    assert names['diagnosis'].missing == ['payload_error']
-    extended, test = names['extended'], names['test']
-    assert extended.test['rmse_after'] < 0.3 * extended.test['rmse_before']
-    rmse = np.sqrt(np.mean((names['angle'] - test.column('angle')) ** 2))
-    assert rmse == pytest.approx(extended.test['rmse_after'])
-
-
 def test_a_dask_cluster_takes_the_diagnosis_as_the_readme_says(readme, tmp_path):
     """The script of the README on a local cluster, in a process of its own."""
     pytest.importorskip('distributed', reason='the extra "cluster" is not installed')

@@ -290,28 +290,30 @@ def find_and_extend(args: argparse.Namespace, folder: Path, model: MuscleModel, 
 
 def draw(path: Path, sequences: Angles, runs: Angles, linear: Angles, again: Angles | None,
          pace: Pace) -> None:
-    """Save the picture: targets and angles reached, and the errors."""
+    """Save the picture: targets and angles reached, and the errors with their means."""
     from hysteresis_ros.report.drawing import new_figure, png
 
-    made = new_figure(10.0, 5.6, 2, len(sequences), sharex='col')
+    made = new_figure(10.0, 6.2, 2, len(sequences), sharex='col')
     figure, axes = made[0], np.asarray(made[1]).reshape(2, -1)
-    styles = [('linear model', linear, '#b0b0b0', '-'), ('identified model', runs, '#1f77b4', '-')]
+    styles = [('linear model', linear, '#b0b0b0'), ('identified model', runs, '#1f77b4')]
     if again is not None:
-        styles.append(('extended model', again, '#2ca02c', '-'))
-    for column, (name, targets) in enumerate(sequences.items()):
+        styles.append(('extended model', again, '#2ca02c'))
+    for (name, targets), (upper, lower) in zip(sequences.items(), axes.T):
         index = np.arange(1, len(targets) + 1)
-        upper, lower = axes[:, column]
         upper.step(index, np.degrees(targets), where='mid', color='black', lw=1.2, label='target')
-        for label, angles, colour, line in styles:
-            reached = angles[name]
-            upper.plot(index, np.degrees(reached), line, marker='o', ms=3, lw=0.8, color=colour,
-                       label=label)
-            lower.plot(index, np.degrees(reached - targets), line, marker='o', ms=3, lw=0.8,
-                       color=colour)
+        for label, angles, colour in styles:
+            error = np.degrees(angles[name] - targets)
+            style = {'marker': 'o', 'ms': 3, 'lw': 0.8, 'color': colour}
+            upper.plot(index, np.degrees(angles[name]), label=label, **style)
+            lower.plot(index, error, label=f'{np.mean(np.abs(error)):.2f} deg', **style)
         lower.axhline(0.0, color='black', lw=0.8)
-        upper.set_title(f'{name} sequence, {len(targets)} values held for {pace.hold:g} s')
+        upper.set_title(f'{name} sequence, {len(targets)} values held for {pace.hold:g} s', pad=20)
+        # Legends stand above the axes, where they cover no point.
+        above = {'loc': 'lower center', 'bbox_to_anchor': (0.5, 0.98), 'frameon': False,
+                 'fontsize': 8, 'title_fontsize': 8, 'handlelength': 1.3, 'columnspacing': 1.2}
+        upper.legend(ncol=1 + len(styles), **above)
+        lower.legend(ncol=len(styles), title='mean error', **above)
         lower.set_xlabel('index')
     axes[0, 0].set_ylabel('angle [deg]')
     axes[1, 0].set_ylabel('error [deg]')
-    axes[0, 0].legend(loc='best', fontsize=8)
     write_bytes(path, png(figure))
