@@ -55,7 +55,7 @@ def test_growth_of_the_stroke_on_the_arm_counts_from_where_the_bench_model_is_ri
     ('voltage', 'force', 'N/V^2', 0.2, 6.0, 2.0), ('current', 'force', 'N/A^2', 1.0, 1e3, 2.0),
     ('temperature', 'stress', 'MPa/K', 5.0, 15.0, 2e6),
     ('temperature', 'force', 'N/K', 0.01, 100.0, 2.0),
-    ('pressure', 'force', 'load/heat', 1e-3 / 12, 1e3 / 12, 2.0)])
+    ('pressure', 'force', 'load/drive squared', 1e-3 / 12, 1e3 / 12, 2.0)])
 def test_clausius_clapeyron_has_the_units_of_the_table(drive, load, unit, low, high, expected):
     made = effect('stress_dependence', WIRE._replace(drive=drive, load_name=load), C=2.0)
     parameter = made.parameters[0]
