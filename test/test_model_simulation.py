@@ -176,6 +176,17 @@ def test_a_run_after_another_needs_fewer_passes_and_gives_the_same(monkeypatch, 
     np.testing.assert_array_equal(found[0], found[1])
 
 
+def test_a_run_is_never_that_of_the_phase_before(monkeypatch):
+    """However small the step of a parameter, or derivatives would lack what the phase answers."""
+    model = bicep_model()
+    simulator = Simulator(model, arm_run(VOLTAGE))
+    given = outputs_given(monkeypatch)
+    simulator.run([effect_of(model, 'resistance_change', eta=0.2)])
+    first = len(given)
+    simulator.run([effect_of(model, 'resistance_change', eta=0.2001)])
+    assert first > 2 and len(given) - first == 2
+
+
 def outputs_given(monkeypatch):
     """Return a list that takes the outputs of H2 from which the share of martensite follows."""
     given = []
