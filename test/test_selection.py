@@ -80,6 +80,20 @@ def test_a_smaller_set_that_is_implausible_would_not_do(payload, monkeypatch):
     assert payload.fits[small].implausible() and not payload._would_do(small, larger)
 
 
+def test_a_larger_set_may_be_the_answer_where_only_it_leaves_no_more_than_the_models_own_error(
+        payload, monkeypatch):
+    """However much more probable it is; where both do, it has to be clearly more probable."""
+    payload.grow(frozenset(['payload_error']))
+    small = frozenset(['payload_error'])
+    larger = next(names for names in payload.fits if small < names)
+    least = payload.log_posterior(small)
+    for odds, small_error, would_do in ((0.1, 1.2, False), (0.1, 0.9, True), (-0.1, 1.2, True)):
+        errors = {small: small_error * payload.rmse_95, larger: 0.8 * payload.rmse_95}
+        monkeypatch.setattr(payload, 'noise_free_rmse', lambda names: errors.get(names, 1.0))
+        monkeypatch.setattr(payload, 'log_posterior', {small: least, larger: least + odds}.get)
+        assert payload._would_do(small, larger) == would_do
+
+
 def two_effects(model):
     """Return a recording of an arm that carries 25 g more, of a supply that sags."""
     return recording(model, [effect_of(model, 'payload_error', dm=25.0),
