@@ -69,7 +69,7 @@ class ArmBalance:
         self.has_dynamics = chain.moves
         compliance = chain.compliance()
         several = len(chain.offsets) > 1
-        wires, self.operators, memories = wires_of(operator, chain.offsets, compliance)
+        wires, self.operators, memories = wires_of(operator, chain)
         frictions = (0.0, self.coulomb, -self.coulomb) if self.coulomb > 0.0 else (0.0,)
         lines = [_line(statics, leverage, friction, self.base, chain, loaded)
                  for friction in frictions]

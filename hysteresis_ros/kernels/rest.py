@@ -82,7 +82,7 @@ def _lacking_bundle(arm: Arm, state: State, line: int, point: float, x: float, o
     share = point - (k - 1)
     output = arm.base + demand_at(arm, line, k, share, offset) / factor
     load = required(arm, state.motion, line, k, share, dt)
-    bundle.inputs_for(arm.wires, state.memories, output, load - x, state.inputs)
+    bundle.inputs_for(arm.wires, state.memories, output, load, x, state.inputs)
     return k, share, load - bundle.mean_load(state.inputs, x)
 
 
@@ -122,7 +122,7 @@ def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: 
     load += part * (required(arm, state.motion, edge, k, share, dt) - load)
     output = arm.base + demand / factor
     if len(arm.wires.offsets) > 1:
-        bundle.inputs_for(arm.wires, state.memories, output, load - x, state.inputs)
+        bundle.inputs_for(arm.wires, state.memories, output, load, x, state.inputs)
     else:
         state.inputs[0] = solve(arm.wires.table, state.memories[0], output)[0]
     return load - bundle.mean_load(state.inputs, x)

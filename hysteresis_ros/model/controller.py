@@ -133,7 +133,7 @@ class Controller:
         self._force = copy.deepcopy(model.force_stage)
         if model.length_stage is not None:
             self._second = SecondStage(model.require_length_stage(), model.sign,
-                                       self._chain.offsets, self._chain.compliance())
+                                       self._chain)
         self._pacing = Pacing(
             [self._chain, *_with_other_lags(model, self._chain, lag_margin)], self._clip,
             self._inputs, horizon, rate_limit, latent * model.surroundings.full_drive_squared)

@@ -7,6 +7,7 @@ import copy
 from typing import Any
 
 from hysteresis_ros.bicep.bundle import Bundle
+from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.operators import HysteresisOperator
 
 # Elongation [m] by which elastic wires may leave the range of the transformation.
@@ -23,19 +24,16 @@ class SecondStage:
         The second stage H2; it is copied.
     sign : int
         -1 for muscles that contract when driven, 1 for one that extends.
-    offsets : tuple of float
-        Excess length [m] of each parallel muscle; one entry for equal muscles.
-    compliance : float
-        Elastic compliance of a wire [m/N].
+    chain : Chain
+        Effects of the model: excess lengths of the muscles, and how a wire strains under its load.
     """
 
-    def __init__(self, operator: HysteresisOperator, sign: int,
-                 offsets: tuple[float, ...], compliance: float) -> None:
-        self._bundle = Bundle(operator, offsets, compliance) if len(offsets) > 1 else None
+    def __init__(self, operator: HysteresisOperator, sign: int, chain: Chain) -> None:
+        self._bundle = Bundle(operator, chain) if len(chain.offsets) > 1 else None
         self._operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self._sign = sign
         self.base, self._top = operator.output_range
-        self._room = max(abs(excess) for excess in offsets) + ELASTIC_ROOM
+        self._room = max(abs(excess) for excess in chain.offsets) + ELASTIC_ROOM
 
     def reset(self) -> None:
         """Wipe the memory."""
