@@ -308,7 +308,7 @@ class Fitter:
             residual = point.whiten(self.problem.measured - fit.predicted)
             jacobian = point.whiten(fit.jacobian) if len(fit.vector) else fit.jacobian
             matrix = jacobian.T @ jacobian + np.diag(spread ** -2.0)
-            evidence = (point.constant - 0.5 * float(residual @ residual) + prior
+            evidence = (float(point.log_density(residual)) + prior
                         - 0.5 * float(np.linalg.slogdet(matrix)[1]))
             if evidence > best.log_evidence:
                 best = dataclasses.replace(

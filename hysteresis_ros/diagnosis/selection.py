@@ -278,6 +278,8 @@ class Selection:
             self.fits[names] = self.fitter.refined(self.fits[names])
             least = self.fitter.least_squares(self.fits[names])
             self._least_errors[names] = self.fitter.error(least.predicted)
+            # Under a covariance the way to the maximum is rough, and not under white noise.
+            self._keep(self.fitter.polished(self.fitter.along(least)))
             self._errors.pop(names, None)
         self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
         self.base = self.fits[frozenset()]
