@@ -51,10 +51,13 @@ class Background:
     ----------
     patience : float
         Time [s] after which a task is given up.
+    niceness : int
+        How much priority it leaves to others.
     """
 
-    def __init__(self, patience: float = 600.0) -> None:
+    def __init__(self, patience: float = 600.0, niceness: int = NICENESS) -> None:
         self._patience = patience
+        self._niceness = niceness
         self._context = multiprocessing.get_context('spawn')
         self._process: Any = None
         self._pipe: Connection | None = None
@@ -81,7 +84,7 @@ class Background:
         if self._process is None or not self._process.is_alive():
             self._pipe, other = self._context.Pipe()
             self._process = self._context.Process(
-                target=_serve, args=(other, os.getpid()), daemon=True, name='background')
+                target=_serve, args=(other, os.getpid(), self._niceness), daemon=True, name='background')
             self._process.start()
             other.close()
         self._begun = time.monotonic()
@@ -154,13 +157,13 @@ class Budget:
         return self.spent / max(now - self._start, 1.0)
 
 
-def _serve(pipe: Connection, giver: int) -> None:
+def _serve(pipe: Connection, giver: int, niceness: int) -> None:
     """Do the tasks that come through a pipe, until the process that gave them ends."""
     end_with(giver)
     # Ctrl-C in a terminal is for the program, which ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        os.nice(NICENESS)
+        os.nice(niceness)
     except OSError:
         pass    # as low as it may be already
     before = 0.0

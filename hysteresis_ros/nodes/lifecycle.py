@@ -130,7 +130,8 @@ class ManagedNode(LifecycleNode):
     def _on_change_state(self, request: ChangeState.Request,
                          response: ChangeState.Response) -> ChangeState.Response:
         """Refuse what this state has no transition for; do all else as rclpy does."""
-        possible = {number: label for number, label, *_ in self._state_machine.available_transitions}
+        transitions = self._state_machine.available_transitions
+        possible = {number: label for number, label, *_ in transitions}
         wanted: Transition = request.transition
         # A label counts before a number, as rclpy has it.
         number = next((one for one, label in possible.items() if label == wanted.label),
