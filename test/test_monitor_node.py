@@ -185,7 +185,7 @@ def test_effect_that_begins_in_mid_run_is_named(graph, tmp_path, monkeypatch):
     monkeypatch.setattr(monitor, 'Background', functools.partial(Background, niceness=0))
     bridge = graph.add(BridgeNode(context=graph.context, parameter_overrides=[
         Parameter(name, value=value) for name, value in {
-            'port': 'sim://bicep?speed=60&seed=1&encoder_offset=1&effects_after=900',
+            'port': 'sim://bicep?speed=60&seed=1&encoder_offset=1&effects_after=600',
             'telemetry_rate': 1.0, 'telemetry_timeout': 5.0, 'setpoint_timeout': 60.0}.items()]))
     node = graph.make(MonitorNode, recording_folder=str(tmp_path))
     statuses, joints = graph.status(), graph.collect(JointState, 'joint_states')
@@ -205,7 +205,7 @@ def test_effect_that_begins_in_mid_run_is_named(graph, tmp_path, monkeypatch):
         end = passed() + 30.0
         graph.until(lambda end=end: passed() >= end, 'the end of a hold')
         # What came before the first message is not counted here.
-        assert node._monitor.diagnoses == 0 or passed() > 500.0
+        assert node._monitor.diagnoses == 0 or passed() > 300.0
     status = said('the model lacks')[-1]
     assert 'the model lacks encoder_offset (offset ' in status.message and status.level == b'\1'
     values = {pair.key: pair.value for pair in status.values}
