@@ -84,7 +84,8 @@ class Background:
         if self._process is None or not self._process.is_alive():
             self._pipe, other = self._context.Pipe()
             self._process = self._context.Process(
-                target=_serve, args=(other, os.getpid(), self._niceness), daemon=True, name='background')
+                target=_serve, args=(other, os.getpid(), self._niceness), daemon=True,
+                name='background')
             self._process.start()
             other.close()
         self._begun = time.monotonic()
