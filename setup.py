@@ -154,7 +154,8 @@ setup(
         # Spreads a diagnosis over a laboratory's machines.
         'cluster': ['dask[distributed]>=2024.1'],
         # ROS 2 Jazzy as wheels, for a machine that has no ROS.
-        'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
+        'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces',
+                'ros-jazzy-lifecycle-msgs'],
         'test': [
             # launch_testing's plug-in, which ROS installs, breaks with pytest 9.
             'pytest>=7.4,<9',

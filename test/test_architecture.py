@@ -11,8 +11,8 @@ import sys
 import pytest
 
 ROS = {'rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
-       'rcl_interfaces', 'rosbag2_py', 'rosgraph_msgs', 'rosidl_runtime_py', 'sensor_msgs',
-       'std_msgs', 'std_srvs', 'trajectory_msgs', 'visualization_msgs'}
+       'lifecycle_msgs', 'rcl_interfaces', 'rosbag2_py', 'rosgraph_msgs', 'rosidl_runtime_py',
+       'sensor_msgs', 'std_msgs', 'std_srvs', 'trajectory_msgs', 'visualization_msgs'}
 # rosbag2_py reads what rosbags does not know, and is asked for only then.
 ROS_OUTSIDE_NODES = {'hysteresis_ros.measurements.bag_rosbag2'}
 MODEL = {'operators', 'effects', 'model', 'identification', 'bicep'}
