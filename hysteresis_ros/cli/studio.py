@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> None:
         raise ParameterError('--test: there is nothing to fit; give --data, too')
     server.require_framework()
     port = server.free_port(args.port)
-    path = args.model or os.path.relpath(share_path(MODEL))
+    path = args.model or str(share_path(MODEL))
     model = load_model(path)
     if args.live:
         live(args, model, path, port)

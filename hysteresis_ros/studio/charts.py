@@ -45,15 +45,18 @@ def options(curves: Curves, colours: Colours) -> dict[str, Any]:
     curves : Curves
     colours : Colours
     """
-    axis = {'nameTextStyle': {'color': colours.text}, 'axisLabel': {'color': colours.text},
+    axis = {'nameTextStyle': {'color': colours.text},
+            'axisLabel': {'color': colours.text, 'showMinLabel': False, 'showMaxLabel': False},
             'axisLine': {'lineStyle': {'color': colours.text}},
             'splitLine': {'lineStyle': {'color': colours.grid}}}
     along = {**axis, 'type': 'value', 'min': rounded(curves.x[0]), 'max': rounded(curves.x[-1])}
     response = limits(np.concatenate([curves.measured, curves.before]))
-    largest = MARGIN + 1.0, float(np.max(np.abs(curves.measured - curves.before)))
-    limit = rounded(max(largest[0] * largest[1], 1e-9))
+    largest = float(np.max(np.abs(curves.measured - curves.before)))
+    limit = rounded(max((1.0 + MARGIN) * largest, 1e-9))
     areas = [[{'xAxis': rounded(low), 'itemStyle': {'color': colours.unseen}},
               {'xAxis': rounded(high)}] for low, high in curves.unseen]
+    # Labels take no room from one of the charts: both have the same axis.
+    sides = {'left': 66, 'right': 14, 'containLabel': False, 'outerBoundsMode': 'none'}
     symbols = len(curves.x) <= MOST_SYMBOLS
 
     def line(name: str, series: str, colour: str, chart: int, width: float,
@@ -77,7 +80,7 @@ def options(curves: Curves, colours: Colours) -> dict[str, Any]:
     return {
         'animation': False, 'backgroundColor': 'transparent',
         'textStyle': {'color': colours.text},
-        'aria': {'enabled': True},
+        'aria': {'enabled': True, 'label': {'description': described(curves)}},
         'legend': {'data': ['measured', 'model as it was', 'model now'], 'top': 0,
                    'textStyle': {'color': colours.text}},
         'tooltip': {'trigger': 'axis', 'confine': True, 'backgroundColor': colours.back,
@@ -85,8 +88,8 @@ def options(curves: Curves, colours: Colours) -> dict[str, Any]:
         'axisPointer': {'link': [{'xAxisIndex': 'all'}]},
         'toolbox': {'right': 0, 'top': -4, 'iconStyle': {'borderColor': colours.text},
                     'feature': {'dataZoom': {'yAxisIndex': 'none'}, 'restore': {}}},
-        'grid': [{'left': 62, 'right': 14, 'top': 44, 'height': '46%'},
-                 {'left': 62, 'right': 14, 'top': '66%', 'bottom': 44}],
+        'grid': [{**sides, 'top': 44, 'height': '48%'},
+                 {**sides, 'top': '66%', 'bottom': 44}],
         'xAxis': [{**along, 'gridIndex': 0, 'axisLabel': {'show': False}},
                   {**along, 'gridIndex': 1, 'name': curves.x_label, 'nameLocation': 'middle',
                    'nameGap': 26}],
@@ -95,6 +98,15 @@ def options(curves: Curves, colours: Colours) -> dict[str, Any]:
                   {**axis, 'gridIndex': 1, 'name': f'residual [{curves.unit or "1"}]',
                    'nameLocation': 'middle', 'nameGap': 44, 'min': -limit, 'max': limit}],
         'series': series}
+
+
+def described(curves: Curves) -> str:
+    """Say what the charts show to whoever does not see them."""
+    before, now = (float(np.mean(np.abs(curves.measured - values)))
+                   for values in (curves.before, curves.now))
+    return (f'{curves.y_label} over {curves.x_label}, {len(curves.x)} rows: measured from '
+            f'{np.min(curves.measured):.4g} to {np.max(curves.measured):.4g}; mean residual of the '
+            f'model as it was {before:.3g} {curves.unit}, now {now:.3g} {curves.unit}')
 
 
 def moved(curves: Curves) -> dict[str, Any]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import functools
 from importlib.resources import files
 import os
 from typing import Any, TYPE_CHECKING
@@ -17,7 +18,7 @@ from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.report.words import verdict_in_words
 from hysteresis_ros.studio import charts
 from hysteresis_ros.studio.jobs import Job
-from hysteresis_ros.studio.session import Entry, MODEL_NAME, REPORT_NAME
+from hysteresis_ros.studio.session import Entry, Errors, MODEL_NAME, REPORT_NAME
 
 if TYPE_CHECKING:
     from hysteresis_ros.studio.feed import Feed
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
 # Time between two looks at whether another tab, a job or the arm has changed something [s].
 LOOK = 0.3
 STEP = 0.002
+# Below this share of the first error the present one is shown as less.
+LESS = 0.98
+# Effects with this probability [%] stand on top.
+LISTED = 0.5
 DARK_QUERY = "matchMedia('(prefers-color-scheme: dark)')"
 WATCH_DARK = f'''<script>
 addEventListener('load', () => {{
@@ -36,6 +41,34 @@ addEventListener('load', () => {{
 </script>'''
 # Jobs go on when a tab is closed; each session has one at a time.
 _jobs: dict[int, Job] = {}
+
+
+class Number:
+    """
+    An error before and now, in large digits.
+
+    Parameters
+    ----------
+    name : str
+        What it is.
+    """
+
+    def __init__(self, name: str) -> None:
+        with ui.element('div').classes('number') as self._box:
+            ui.label(name).classes('soft')
+            with ui.element('div').classes('values'):
+                self._before = ui.label().classes('before')
+                self._now = ui.label().classes('now')
+
+    def show(self, errors: Errors | None, unit: str, scale: float) -> None:
+        """Show errors in a unit that is `scale` times that of the response; None hides it."""
+        self._box.visible = errors is not None
+        if errors is not None:
+            self._before.text = f'{number(scale * errors.before)} →'
+            self._now.text = f'{number(scale * errors.now)} {unit}'
+            falls = errors.now < LESS * errors.before
+            self._box.classes(add='better' if falls else 'same',
+                              remove='same' if falls else 'better')
 
 
 class Page:
@@ -56,20 +89,29 @@ class Page:
         self._pending: dict[str, float] = {}
         self._sliding = False
         self._values: dict[str, ui.label] = {}
-        self._open_groups = True
+        self._units: dict[str, str] = {}
+        self._lines: list[ui.label] = []
 
     def build(self) -> None:
         """Put the elements of the page together."""
         ui.add_css((files('hysteresis_ros.studio') / 'web' / 'studio.css').read_text('utf-8'))
+        ui.colors(primary='#2f6db5')
         ui.add_head_html(WATCH_DARK)
         ui.on('shade', lambda event: self._shade(bool(event.args)))
         with ui.element('main').classes('studio'):
             with ui.element('section').classes('left').props('aria-label="Effects"'):
                 self._left()
-            with ui.element('section').classes('middle').props('aria-label="Response"'):
-                self._middle()
-            with ui.element('section').classes('right').props('aria-label="Parameters"'):
-                self._right()
+            with ui.element('div').classes('work'):
+                with ui.element('section').classes('errors').props(
+                        'aria-label="Errors" aria-live="polite"'):
+                    self._errors()
+                with ui.element('section').classes('middle').props('aria-label="Response"'):
+                    self._middle()
+                with ui.element('section').classes('right').props('aria-label="Parameters"'):
+                    self._right()
+                with ui.element('section').classes('below').props('aria-label="Commands"'):
+                    ui.label('What was done, as commands').classes('heading')
+                    self._commands = ui.element('div').classes('commands')
         self._show_all()
         ui.timer(LOOK, self._look)
         ui.timer(0.05, self._ask_shade, once=True)
@@ -84,16 +126,16 @@ class Page:
         self._verdict = ui.label().classes('verdict')
         self._catalogue = ui.element('div').classes('catalogue')
 
+    def _errors(self) -> None:
+        self._about = ui.label().classes('soft')
+        with ui.element('div').classes('numbers'):
+            self._numbers = {'fitted': Number('RMSE, fitted rows'),
+                             'unseen': Number('RMSE, unseen rows')}
+
     def _middle(self) -> None:
-        self._about = ui.label().classes('soft about')
-        with ui.element('div').classes('numbers').props('aria-live="polite"'):
-            self._fitted = self._number('fitted rows')
-            self._unseen = self._number('unseen rows')
         self._parts = ui.element('div').classes('line')
         self._trouble = ui.label().classes('warning')
         self._chart = ui.echart({}).classes('chart')
-        ui.label('What was done, as commands').classes('heading')
-        self._commands = ui.element('div').classes('commands')
 
     def _right(self) -> None:
         with ui.row().classes('line'):
@@ -113,14 +155,6 @@ class Page:
                     'no-caps dense outline')
         self._note = ui.label().classes('soft')
         self._sliders = ui.element('div').classes('sliders')
-
-    def _number(self, name: str) -> ui.element:
-        with ui.element('div').classes('number') as box:
-            ui.label(f'RMSE, {name}').classes('soft')
-            with ui.element('div').classes('values'):
-                box.before = ui.label().classes('before')   # type: ignore[attr-defined]
-                box.now = ui.label().classes('now')     # type: ignore[attr-defined]
-        return box
 
     # What is shown.
 
@@ -145,11 +179,11 @@ class Page:
         self._catalogue.clear()
         with self._catalogue:
             if found:
-                likely = [one for one in entries if (one.probability or 0.0) >= 0.005]
+                likely = [one for one in entries if 100.0 * (one.probability or 0.0) >= LISTED]
                 likely.sort(key=lambda one: -(one.probability or 0.0))
                 unknown = self.session.probabilities().get('unknown', 0.0)
                 self._group('probable', likely)
-                if unknown >= 0.005:
+                if 100.0 * unknown >= LISTED:
                     with ui.element('div').classes('effect'):
                         ui.label('unknown cause').classes('unknown')
                         self._share(unknown)
@@ -161,7 +195,10 @@ class Page:
         if entries:
             ui.label(name).classes('heading')
         for entry in entries:
-            with ui.element('div').classes('effect'):
+            row = ui.element('div').classes('effect')
+            if entry.hidden:
+                row.classes('dim')
+            with row:
                 box = ui.checkbox(entry.name, value=entry.ticked or entry.built_in).props('dense')
                 box.on_value_change(
                     lambda event, name=entry.name: self._on_tick(name, event.value))
@@ -178,10 +215,11 @@ class Page:
     @staticmethod
     def _share(probability: float) -> None:
         percent = 100.0 * probability
-        ui.label(f'{percent:.0f} %' if percent >= 0.5 or percent == 0.0 else '< 1 %').classes(
+        ui.label(f'{percent:.0f} %' if percent >= LISTED or percent == 0.0 else '< 1 %').classes(
             'percent')
-        with ui.element('div').classes('share'):
-            ui.element('div').style(f'width: {percent:.1f}%')
+        if percent >= LISTED:
+            with ui.element('div').classes('share'):
+                ui.element('div').style(f'width: {percent:.1f}%')
 
     def _show_parts(self) -> None:
         session = self.session
@@ -218,9 +256,10 @@ class Page:
                         self._slider(slider)
 
     def _slider(self, slider: Slider) -> None:
-        choices = slider.parameter.choices
+        choices = slider.choices
         with ui.element('div').classes('slider'):
             ui.label(slider.parameter.name).classes('name')
+            self._units[slider.name] = slider.unit
             self._values[slider.name] = ui.label(written(slider)).classes('value')
             control = ui.slider(
                 min=0.0, max=float(len(choices) - 1) if choices else 1.0,
@@ -243,25 +282,29 @@ class Page:
         session = self.session
         unit, scale = shown(session.quantity)
         errors = session.errors() if session.ready else {}
-        for box, name in ((self._fitted, 'fitted'), (self._unseen, 'unseen')):
-            box.visible = name in errors
-            if name in errors:
-                before, now = (scale * value for value in (errors[name].before, errors[name].now))
-                box.before.text = f'{number(before)} →'  # type: ignore[attr-defined]
-                box.now.text = f'{number(now)} {unit}'  # type: ignore[attr-defined]
-                box.classes(add='better' if now < 0.98 * before else 'same',
-                            remove='same' if now < 0.98 * before else 'better')
+        for name, shown_number in self._numbers.items():
+            shown_number.show(errors.get(name), unit, scale)
         trouble = self.feed.trouble if self.feed else ''
         if self.feed is not None and not session.ready and not trouble:
             trouble = ('waiting for joint_states and applied_voltage: is the bridge running, on '
                        'this ROS_DOMAIN_ID?')
         self._trouble.text, self._trouble.visible = trouble, bool(trouble)
-        self._commands.clear()
-        with self._commands:
-            for line in session.commands():
-                with ui.element('div').classes('command'):
-                    ui.element('code').add_slot('default', None)
-                    ui.code(line, language='bash')
+        lines = session.commands()
+        if len(lines) != len(self._lines):
+            self._commands.clear()
+            with self._commands:
+                self._lines = [self._command() for _ in lines]
+        for label, line in zip(self._lines, lines):
+            label.text = line
+
+    @staticmethod
+    def _command() -> ui.label:
+        with ui.element('div').classes('command'):
+            label = ui.label().classes('code')
+            ui.button(icon='content_copy', on_click=lambda: (
+                ui.clipboard.write(label.text), ui.notify('copied'))).props(
+                'flat dense size=sm aria-label="Copy the command"')
+        return label
 
     # What is done.
 
@@ -273,6 +316,8 @@ class Page:
 
     async def _ask_shade(self) -> None:
         self._shade(bool(await ui.run_javascript(f'{DARK_QUERY}.matches', timeout=10.0)))
+        # The chart may have been made before the columns of the page had their widths.
+        self._chart.run_chart_method('resize')
 
     def _look(self) -> None:
         """Take in what another tab, a job or the arm has changed."""
@@ -321,8 +366,10 @@ class Page:
             while self._pending:
                 values, self._pending = self._pending, {}
                 for name, value in values.items():
-                    await run.io_bound(self.session.slide, name, value)
-                    self._values[name].text = f'{value:.4g} {slider.unit}'
+                    await run.io_bound(
+                        self._try, functools.partial(self.session.slide, name, value))
+                    if name in self._values:
+                        self._values[name].text = f'{value:.4g} {self._units[name]}'
                 self._seen = self.session.version
                 self._chart.run_chart_method('setOption', charts.moved(self.session.curves()))
                 self._show_errors()
@@ -331,7 +378,9 @@ class Page:
             self._sliding = False
 
     def _start(self, name: str, work: Callable[..., object]) -> None:
-        _jobs[id(self.session)] = Job(name, work)
+        job = _jobs.get(id(self.session))
+        if job is None or not job.running:
+            _jobs[id(self.session)] = Job(name, work)
         self._look()
 
     def _on_diagnose(self) -> None:

@@ -47,24 +47,27 @@ class Slider:
         return '' if self.parameter.unit == '1' else self.parameter.unit
 
     @property
+    def choices(self) -> list[float]:
+        """The only values that it can have, ascending; empty for any value between the ends."""
+        return sorted(self.parameter.choices)
+
+    @property
     def logarithmic(self) -> bool:
         """Whether equal ways along the slider multiply the value."""
         return self.parameter.log and self.low > 0.0
 
     @property
     def position(self) -> float:
-        """Where the value lies between the ends, 0 to 1."""
-        if self.parameter.choices:
-            return float(self.parameter.choices.index(self.value)
-                         if self.value in self.parameter.choices else 0)
+        """Where the value lies between the ends, 0 to 1, or the number of its choice."""
+        if self.choices:
+            return float(self.choices.index(self.value) if self.value in self.choices else 0)
         low, high, value = (self._along(x) for x in (self.low, self.high, self.value))
         return min(max((value - low) / (high - low), 0.0), 1.0)
 
     def at(self, position: float) -> float:
         """Return the value at a position, or the choice of that number."""
-        choices = self.parameter.choices
-        if choices:
-            return choices[int(min(max(round(position), 0), len(choices) - 1))]
+        if self.choices:
+            return self.choices[int(min(max(round(position), 0), len(self.choices) - 1))]
         low, high = self._along(self.low), self._along(self.high)
         along = low + min(max(position, 0.0), 1.0) * (high - low)
         return rounded(math.exp(along) if self.logarithmic else along, self.high - self.low)
