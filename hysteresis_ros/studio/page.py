@@ -32,13 +32,12 @@ STEP = 0.002
 LESS = 0.98
 # Effects with this probability [%] stand on top.
 LISTED = 0.5
-DARK_QUERY = "matchMedia('(prefers-color-scheme: dark)')"
-WATCH_DARK = f'''<script>
-addEventListener('load', () => {{
-  const query = {DARK_QUERY};
-  query.addEventListener('change', () => emitEvent('shade', query.matches));
-}});
-</script>'''
+DARK_QUERY = 'matchMedia("(prefers-color-scheme: dark)")'
+WATCH_DARK = (
+    '<script>addEventListener("load", () => {'
+    f'const query = {DARK_QUERY};'
+    'query.addEventListener("change", () => emitEvent("shade", query.matches));'
+    '});</script>')
 # Jobs go on when a tab is closed; each session has one at a time.
 _jobs: dict[int, Job] = {}
 
@@ -301,8 +300,7 @@ class Page:
     def _command() -> ui.label:
         with ui.element('div').classes('command'):
             label = ui.label().classes('code')
-            ui.button(icon='content_copy', on_click=lambda: (
-                ui.clipboard.write(label.text), ui.notify('copied'))).props(
+            ui.button(icon='content_copy', on_click=lambda: copy(label.text)).props(
                 'flat dense size=sm aria-label="Copy the command"')
         return label
 
@@ -412,6 +410,12 @@ class Page:
             app.add_static_file(local_file=path, url_path=address, max_cache_age=0)
             self._report.text = os.path.basename(path)
             self._report.props(f'href="{address}"')
+
+
+def copy(text: str) -> None:
+    """Put a text on the browser's clipboard."""
+    ui.clipboard.write(text)
+    ui.notify('copied')
 
 
 def written(slider: Slider) -> str:

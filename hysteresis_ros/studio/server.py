@@ -21,7 +21,7 @@ FIRST_PORT, PORTS = 8080, 100
 # The page may load what this server has, and talk to it alone.
 POLICY = ("default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
           "connect-src 'self' ws://127.0.0.1:{port} ws://localhost:{port}; frame-ancestors 'none'")
-MISSING = ("the page needs the package {name}, which is not installed: "
+MISSING = ('the page needs the package {name}, which is not installed: '
            "pip install 'hysteresis_ros[studio]'")
 
 
