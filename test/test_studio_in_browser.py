@@ -133,7 +133,7 @@ def port(folder, root):
         yield port
         server.send_signal(signal.SIGINT)
         said = server.communicate(timeout=DEADLINE)[0]
-        assert server.returncode in (0, 130) and 'Traceback' not in said, said
+        assert server.returncode == 0 and said == '', said
         assert '.nicegui' not in os.listdir(folder)
     finally:
         server.kill()
@@ -179,8 +179,10 @@ def test_the_error_falls_under_the_hand_and_what_is_seen_is_saved(tab, folder):
 def test_the_diagnosis_runs_behind_the_page(tab, folder):
     tab.open()
     tab.click('button', 'diagnose')
-    tab.until(lambda: 'Missing: payload_error' in tab.text('.verdict'))
-    assert re.search(r'payload_error\s+(100|9\d) %', tab.text('.catalogue'))
+    tab.until(lambda: tab.text('.verdict').startswith('Missing: '))
+    # So few rows leave others that are as probable; what cannot be is at 0.
+    assert re.search(r'probable\s.*payload_error\s+\d\d+ %.*clamp_mass\s+0 %', tab.text('.catalogue'),
+                     re.DOTALL)
     if not tab.ticked('payload_error'):
         tab.click('.effect .q-checkbox', 'payload_error')
     tab.until(lambda: tab.browser.run(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 from typing import TYPE_CHECKING
 
@@ -41,8 +42,9 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         'or of the recordings, of --data)')
     parser.add_argument('--live', action='store_true',
                         help='listen to the topics of a running bridge')
-    parser.add_argument('--record', type=OutputFile, default='live.csv', metavar='R.csv',
-                        help='where a live recording is saved (default: live.csv)')
+    parser.add_argument('--record', type=OutputFile, metavar='R.csv',
+                        help='where a live recording is saved (default: live.csv, or the next of '
+                        'live_2.csv, live_3.csv, ... that is free)')
     parser.add_argument('--namespace', metavar='NS',
                         help='which arm to take from a bag, or to listen to')
     add_columns(parser)
@@ -74,7 +76,8 @@ def run(args: argparse.Namespace) -> None:
         return
     session = opened(args, model, path)
     announce(port)
-    server.serve(session, port, show=not args.no_browser)
+    with contextlib.suppress(KeyboardInterrupt):
+        server.serve(session, port, show=not args.no_browser)
 
 
 def opened(args: argparse.Namespace, model: MuscleModel, path: str) -> Session:
@@ -113,14 +116,28 @@ def live(args: argparse.Namespace, model: MuscleModel, path: str, port: int) -> 
         raise ParameterError(f'--live needs ROS 2: {error}; source it first') from None
     os.makedirs(args.output, exist_ok=True)
     session = Session(model, [], model_path=path, folder=args.output)
-    with Listener(args.record, args.namespace) as listener:
-        feed = Feed(session, listener.recording, args.record)
+    record = args.record or free_name('live', '.csv')
+    with Listener(record, args.namespace) as listener:
+        feed = Feed(session, listener.recording, record)
         feed.start()
+        announce(port)
         try:
-            announce(port)
             server.serve(session, port, show=not args.no_browser, feed=feed)
+        except KeyboardInterrupt:
+            pass
         finally:
             feed.stop()
+            if session.ready and not feed.saved:
+                print(f'The recording: {feed.save()}')
+
+
+def free_name(name: str, suffix: str) -> str:
+    """Return the first of `name`, `name_2`, ... that is no file yet, with a suffix."""
+    number, path = 1, name + suffix
+    while os.path.lexists(path):
+        number += 1
+        path = f'{name}_{number}{suffix}'
+    return path
 
 
 def announce(port: int) -> None:

@@ -39,6 +39,8 @@ class Feed:
         Whether the session gets what is new.
     trouble : str
         Why it does not, in one line; '' if it does.
+    saved : bool
+        Whether all that the session has got is in the file.
     """
 
     def __init__(self, session: Session, source: Callable[[], Measurement | None], path: str,
@@ -46,6 +48,7 @@ class Feed:
         self.session, self.path = session, path
         self.listening = True
         self.trouble = ''
+        self.saved = False
         self._source, self._period = source, period
         self._rows = 0
         self._end = threading.Event()
@@ -68,7 +71,7 @@ class Feed:
             if recording is None or recording.rows == self._rows:
                 return
             self.session.update([recording])
-            self._rows, self.trouble = recording.rows, ''
+            self._rows, self.trouble, self.saved = recording.rows, '', False
         except HysteresisError as error:
             self.trouble = ' '.join(str(error).split())
             self.session.touch()
@@ -86,6 +89,7 @@ class Feed:
 
         if self.session.ready:
             write_csv(self.session.recordings[0], self.path)
+            self.saved = True
         return self.path
 
     def _run(self) -> None:

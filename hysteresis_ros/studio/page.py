@@ -5,10 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import functools
 from importlib.resources import files
 import os
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from nicegui import app, run, ui
 
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from hysteresis_ros.studio.session import Session
     from hysteresis_ros.studio.sliders import Slider
 
+Result = TypeVar('Result')
 # Time between two looks at whether another tab, a job or the arm has changed something [s].
 LOOK = 0.3
 STEP = 0.002
@@ -335,23 +335,23 @@ class Page:
         if self._seen != self.session.version and not self._sliding:
             self._show_all()
 
-    def _try(self, action: Callable[[], Any]) -> Any:
-        """Return the result of an action, None if it is refused; then say why."""
+    async def _do(self, action: Callable[..., Result], *values: object) -> Result | None:
+        """Return the result of an action in a thread, None if it is refused; then say why."""
         try:
-            return action()
+            return await run.io_bound(action, *values)
         except (HysteresisError, OSError) as error:
             ui.notify(' '.join(str(error).split()), type='negative', multi_line=True,
                       timeout=10000)
             return None
 
     async def _on_tick(self, name: str, on: bool) -> None:
-        await run.io_bound(self._try, lambda: self.session.tick(name, on))
+        await self._do(self.session.tick, name, on)
         self._show_all()
 
-    def _on_part(self, name: str, fitted: bool) -> None:
+    async def _on_part(self, name: str, fitted: bool) -> None:
         unseen = {part.name for part in self.session.unseen}
         unseen = unseen - {name} if fitted else unseen | {name}
-        self._try(lambda: self.session.hold_out(unseen))
+        await self._do(self.session.hold_out, unseen)
         self._show_all()
 
     async def _on_slide(self, slider: Slider, position: float) -> None:
@@ -364,8 +364,7 @@ class Page:
             while self._pending:
                 values, self._pending = self._pending, {}
                 for name, value in values.items():
-                    await run.io_bound(
-                        self._try, functools.partial(self.session.slide, name, value))
+                    await self._do(self.session.slide, name, value)
                     if name in self._values:
                         self._values[name].text = f'{value:.4g} {self._units[name]}'
                 self._seen = self.session.version
@@ -393,18 +392,18 @@ class Page:
             job.stop()
 
     async def _on_save(self) -> None:
-        path = await run.io_bound(self._try, lambda: self.session.save(self._file.value or ''))
+        path = await self._do(self.session.save, self._file.value or '')
         if path:
             ui.notify(f'written to {path}', type='positive')
 
-    def _on_save_recording(self) -> None:
+    async def _on_save_recording(self) -> None:
         if self.feed is not None and self.session.ready:
-            path = self._try(self.feed.save)
+            path = await self._do(self.feed.save)
             if path:
                 ui.notify(f'written to {path}', type='positive')
 
     async def _on_report(self) -> None:
-        path = await run.io_bound(self._try, lambda: self.session.report(REPORT_NAME))
+        path = await self._do(self.session.report, REPORT_NAME)
         if path:
             address = f'/report/{self.session.version}'
             app.add_static_file(local_file=path, url_path=address, max_cache_age=0)
