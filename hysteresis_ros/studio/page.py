@@ -90,6 +90,9 @@ class Page:
         self._values: dict[str, ui.label] = {}
         self._units: dict[str, str] = {}
         self._lines: list[ui.label] = []
+        # What the parts of the page show now: they are made anew only when that has changed, or a
+        # live recording would take a box away under the pointer.
+        self._shown: dict[str, object] = {}
 
     def build(self) -> None:
         """Put the elements of the page together."""
@@ -170,11 +173,21 @@ class Page:
         self._show_chart()
         self._show_errors()
 
+    def _is_shown(self, part: str, content: object) -> bool:
+        """Whether a part of the page shows this already; from now on it does."""
+        if self._shown.get(part, self) == content:
+            return True
+        self._shown[part] = content
+        return False
+
     def _show_catalogue(self) -> None:
         found = self.session.diagnosis
         self._verdict.text = verdict_in_words(found) if found else ''
         self._verdict.visible = found is not None
         entries = self.session.catalogue()
+        if self._is_shown('catalogue', (entries, self.session.probabilities(),
+                                        self.session.ready)):
+            return
         self._catalogue.clear()
         with self._catalogue:
             if found:
@@ -222,6 +235,8 @@ class Page:
 
     def _show_parts(self) -> None:
         session = self.session
+        if self._is_shown('parts', (list(session.parts), list(session.unseen))):
+            return
         self._parts.clear()
         if len(session.parts) < 2:
             return
@@ -234,8 +249,6 @@ class Page:
 
     def _show_sliders(self) -> None:
         session = self.session
-        self._sliders.clear()
-        self._values.clear()
         found = session.sliders()
         fixed = [effect.id for effect in session.effects
                  if effect.id not in {one.effect for one in found}]
@@ -247,6 +260,10 @@ class Page:
             self._note.text = 'Fitted; in brackets 95 % intervals.'
         else:
             self._note.text = 'Set by hand.'
+        if self._is_shown('sliders', (found, fixed)):
+            return
+        self._sliders.clear()
+        self._values.clear()
         with self._sliders:
             for name in dict.fromkeys([*(one.effect for one in found), *fixed]):
                 ui.label(name).classes('heading')
@@ -346,12 +363,15 @@ class Page:
 
     async def _on_tick(self, name: str, on: bool) -> None:
         await self._do(self.session.tick, name, on)
+        # A box that was ticked in vain has to be drawn anew, though nothing has changed.
+        self._shown.pop('catalogue', None)
         self._show_all()
 
     async def _on_part(self, name: str, fitted: bool) -> None:
         unseen = {part.name for part in self.session.unseen}
         unseen = unseen - {name} if fitted else unseen | {name}
         await self._do(self.session.hold_out, unseen)
+        self._shown.pop('parts', None)
         self._show_all()
 
     async def _on_slide(self, slider: Slider, position: float) -> None:
