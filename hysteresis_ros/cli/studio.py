@@ -49,7 +49,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         help='which arm to take from a bag, or to listen to')
     add_columns(parser)
     add_settled(parser)
-    parser.add_argument('-o', '--output', type=OutputFolder, default='.', metavar='DIR',
+    parser.add_argument('-o', '--output', type=OutputFolder, metavar='DIR',
                         help='folder for models and reports (default: this one)')
     parser.add_argument('--port', type=int, metavar='N',
                         help='of the page (default: the next free one from 8080 on)')
@@ -67,6 +67,7 @@ def run(args: argparse.Namespace) -> None:
         raise ParameterError('--live makes a recording of its own; leave --data and --test away')
     if args.test and not args.data:
         raise ParameterError('--test: there is nothing to fit; give --data, too')
+    args.output = args.output or '.'
     server.require_framework()
     port = server.free_port(args.port)
     path = args.model or str(share_path(MODEL))
