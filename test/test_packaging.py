@@ -195,12 +195,15 @@ def test_type_checkers_of_users_see_our_hints(wheel):
 
 def test_style_and_script_of_pages_are_installed(wheel, prefix, root):
     """By pip and by colcon."""
-    names = {path.name for path in (root / 'hysteresis_ros/report/web').iterdir()}
-    with zipfile.ZipFile(wheel) as archive:
-        packed = {name.rpartition('/')[2] for name in archive.namelist() if '/report/web/' in name}
-    built = next(prefix.glob('lib/python*/site-packages/hysteresis_ros/report/web'))
-    assert packed == {path.name for path in built.iterdir()} == names
-    assert {'page.css', 'chart.js'} < names
+    for room, expected in (('report', {'page.css', 'chart.js'}), ('studio', {'studio.css'})):
+        web = f'hysteresis_ros/{room}/web'
+        names = {path.name for path in (root / web).iterdir()}
+        with zipfile.ZipFile(wheel) as archive:
+            packed = {name.rpartition('/')[2] for name in archive.namelist()
+                      if f'{web}/' in name}
+        built = next(prefix.glob(f'lib/python*/site-packages/{web}'))
+        assert packed == {path.name for path in built.iterdir()} == names
+        assert expected <= names
 
 
 def test_the_wheel_holds_the_package_alone(wheel):
@@ -236,10 +239,11 @@ def test_every_import_is_a_declared_dependency(root, description):
     rosdep = {depend.name for depend in package.exec_depends}
     modules = imported(root)
     pip = {Requirement(line).name.lower() for line in description.install_requires}
-    for extra in ('bags', 'cluster'):
+    for extra in ('bags', 'cluster', 'studio'):
         pip |= {Requirement(line).name.lower() for line in description.extras_require[extra]}
-    # No rosdep keys. rosbag2_py does what rosbags does; the others make things faster.
-    optional = {'rosbags', 'dask', 'distributed', 'threadpoolctl'}
+    # No rosdep keys. rosbag2_py does what rosbags does; the studio is a command of its own; the
+    # others make things faster.
+    optional = {'rosbags', 'dask', 'distributed', 'threadpoolctl', 'nicegui', 'starlette'}
     by_rosdep = {name for name in modules
                  if ROSDEP.get(name, f'python3-{name}') in rosdep or name in rosdep}
     assert modules - by_rosdep - optional == set()
@@ -267,7 +271,7 @@ def test_what_rosdep_does_not_know_can_be_missing(root):
     code = """
 import sys
 
-for name in ('threadpoolctl', 'rosbags', 'dask', 'distributed', 'xacro', 'yourdfpy'):
+for name in ('threadpoolctl', 'rosbags', 'dask', 'distributed', 'xacro', 'yourdfpy', 'nicegui'):
     sys.modules[name] = None
 from hysteresis_ros.cli.main import main
 from hysteresis_ros.workers import delayed, in_parallel
