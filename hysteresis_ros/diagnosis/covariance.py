@@ -35,8 +35,8 @@ TIME_SPREAD = 1.5
 # goes beyond is no error that the bench has seen.
 LARGEST_SCALE = 0.6
 EVALUATIONS = 25
-# Degrees of freedom of the whitened residuals: those of clean arms of three constitutive models have
-# a kurtosis of 5 to 40, where a Gaussian has 3 and Student's t with more than 4 a finite one.
+# Degrees of freedom of whitened residuals: those of clean arms of three constitutive models have a
+# kurtosis of 5 to 40, where a Gaussian has 3, and Student's t a finite one only above 4.
 TAILS = 4.0
 _TINY = 1e-300
 
@@ -63,7 +63,6 @@ class Point:
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """Return columns (n,) or (n, k) in units in which the covariance is the identity."""
         return linalg.solve_triangular(self.factor, columns, lower=True, check_finite=False)
-
 
     def log_density(self, whitened: np.ndarray) -> np.ndarray:
         """
