@@ -235,8 +235,17 @@ def test_model_that_cannot_be_read_is_told_when_configuring(compensator, capfd):
 def test_processes_end_cleanly_in_every_state(graph):
     """Ctrl-C finds nothing to do in a node that was never configured."""
     with process('bridge_node', '--ros-args', '-p', 'autostart:=false') as child:
-        answer = graph.call(GetState, 'hardware_bridge/get_state', GetState.Request())
-        assert answer.current_state.label == 'unconfigured'
+        client, labels = graph.probe.create_client(GetState, 'hardware_bridge/get_state'), []
+
+        def answered():
+            # The first answers may be gone before a service of another process knows who asked.
+            client.call_async(GetState.Request()).add_done_callback(
+                lambda future: labels.append(future.result().current_state.label))
+            graph.spin(0.5)
+            return bool(labels)
+
+        graph.until(answered, 'its state')
+        assert labels[0] == 'unconfigured'
         child.send_signal(signal.SIGINT)
         out, err = child.communicate(timeout=15)
     assert (child.returncode, out) == (0, '') and 'rror' not in err

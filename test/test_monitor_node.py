@@ -168,7 +168,8 @@ def test_services_say_what_cannot_be_done(graph, tmp_path):
     assert '\n' not in answer.message
     answer = graph.call(Trigger, 'model_monitor/diagnose', Trigger.Request())
     assert not answer.success
-    assert re.fullmatch('[23] holds of the arm have ended so far; a diagnosis needs 8', answer.message)
+    assert re.fullmatch('[23] holds of the arm have ended so far; a diagnosis needs 8',
+                        answer.message)
 
 
 def test_no_diagnosis_where_none_is_wanted(graph):
