@@ -119,18 +119,19 @@ def test_two_effects_behind_one_are_found_as_a_pair(model):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('hidden, gain', [
-    ({'payload_error': {'dm': -15.0}, 'supply_sag': {'Rs': 0.8}}, lambda gains: max(gains.values())),
-    ({'end_stop': {}, 'payload_error': {'dm': 25.0}},
-     lambda gains: gains[frozenset(['payload_error'])])], ids=['all', 'least-squares'])
-def test_sets_are_fitted_in_the_units_that_they_are_judged_by(hidden, gain):
+@pytest.mark.parametrize('hidden, judged', [
+    ({'payload_error': {'dm': -15.0}, 'supply_sag': {'Rs': 0.8}}, None),
+    ({'end_stop': {}, 'payload_error': {'dm': 25.0}}, 'payload_error')],
+    ids=['all', 'least-squares'])
+def test_sets_are_fitted_in_the_units_that_they_are_judged_by(hidden, judged):
     """Fitted once more from their values they gain nothing, where the way there is rough, too."""
     model = bicep_model(metrics={'length': {'verification': {'rmse': 1e-4}}})
     effects = [effect_of(model, name, **values) for name, values in hidden.items()]
     found = selection(model, recording(model, effects),
                       [*TRIED, 'airflow', 'pwm_dead_zone', 'end_stop'])
-    assert gain({names: found.fitter.polished(fit).log_evidence - fit.log_evidence
-                 for names, fit in found.fits.items()}) < 1.0
+    for names, fit in found.fits.items():
+        if judged is None or names == {judged}:
+            assert found.fitter.polished(fit).log_evidence < fit.log_evidence + 1.0, names
 
 
 def test_a_pair_that_is_stuck_is_fitted_from_all_starts(monkeypatch):
