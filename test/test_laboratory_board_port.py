@@ -6,6 +6,8 @@ import contextlib
 import threading
 import time
 
+import math
+
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.board.cable import Cable
@@ -38,7 +40,8 @@ def open_port(url, clock=time.monotonic):
 
 
 def cable(**options):
-    simulation = Simulation(**options)
+    simulation = parse_url('sim://bicep?' + '&'.join(
+        f'{key}={value}' for key, value in options.items()))
     return Cable(SimulatedBoard(Plant(0).arm, brownout=simulation.brownout), simulation)
 
 
@@ -56,10 +59,14 @@ def test_url_with_every_key_is_read():
     simulation = parse_url(
         'sim://bicep?speed=60&seed=3&recording=2&recording_time=100&time_constant=2&supply=24'
         '&drop=0.01&garbage=0.1&brownout=5&unplug_after=1&unplug_for=2&silent_after=3'
-        '&silent_for=4&deaf_after=5&deaf_for=6&supply_sag=0.4&payload_error=-1&effects_after=7')
-    assert simulation == Simulation(60.0, 3, 2, 100.0, 2.0, 24.0, 0.01, 0.1, 5.0, 1.0, 2.0, 3.0,
-                                    4.0, 5.0, 6.0, {'supply_sag': 0.4, 'payload_error': -1.0},
-                                    effects_after=7.0)
+        '&silent_for=4&deaf_for=6&deaf_after=5&supply_sag=0.4&payload_error=-1&flip=0.02'
+        '&double=0.03&clock_back=7&encoder_jump=8&muscle=grains&late_after=9&effects_after=7')
+    assert simulation == Simulation(
+        60.0, 3, 2, 100.0, 2.0, 24.0, 0.01, 0.02, 0.03, 0.1, 5.0, 7.0, 8.0,
+        {'unplug': (1.0, 2.0), 'silent': (3.0, 4.0), 'deaf': (5.0, 6.0), 'late': (9.0, math.inf)},
+        {'supply_sag': 0.4, 'payload_error': -1.0}, 'grains', 7.0)
+    assert not simulation.lasts('unplug', 0.99) and simulation.lasts('unplug', 2.99)
+    assert not simulation.lasts('unplug', 3.0) and not simulation.lasts('mad', 5.0)
 
 
 @pytest.mark.parametrize('url, words', [
@@ -67,6 +74,7 @@ def test_url_with_every_key_is_read():
     ('sim://bicep?sped=60', "no 'sped'; keys are speed, seed"), ('sim://bicep?speed', 'speed'),
     ('sim://bicep?speed=', 'a number from 0.01'), ('sim://bicep?speed=fast', 'speed=fast'),
     ('sim://bicep?speed=0', 'from 0.01 to 1000'), ('sim://bicep?speed=nan', 'speed=nan'),
+    ('sim://bicep?late_at=1', 'NAME_after'), ('sim://bicep?deaf_for=x', 'deaf_for=x'),
     ('sim://bicep?drop=0.9', 'from 0 to 0.5'), ('sim://bicep?seed=1.5', 'a whole number'),
     ('sim://bicep?seed=1&seed=2', 'seed is given twice'),
     ('sim://bicep?unplug_after=-1', 'from 0 to inf'), ('sim://bicep?supply_sag=x', 'supply_sag=x')])

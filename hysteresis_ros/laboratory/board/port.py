@@ -62,7 +62,8 @@ class SimulatedPort:
         simulation = parse_url(url)
         board = SimulatedBoard(make_plant(simulation).arm, supply=simulation.supply,
                                seed=simulation.seed, speed=simulation.speed,
-                               brownout=simulation.brownout)
+                               brownout=simulation.brownout, clock_back=simulation.clock_back,
+                               encoder_jump=simulation.encoder_jump)
         self.cable = Cable(board, simulation)
         self.is_open = False
         self._clock = clock

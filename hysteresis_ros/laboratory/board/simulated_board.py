@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.bridge.messages import (
@@ -36,6 +37,11 @@ INDEX_COUNTS = 2731         # the index pulse: at 120 degrees, within the range 
 COUNTS_PER_REVOLUTION = 8192
 SUPPLY_NOISE = 0.01         # V, standard deviation of the supply's measurement
 
+JUMP_COUNTS = 5 * COUNTS_PER_REVOLUTION // 2   # of an encoder that jumps
+CLOCK_JUMP = 60000          # ms by which a clock jumps back
+# Share of the nominal supply in each trouble of it.
+SUPPLY_TROUBLES = {'supply_low': 0.6, 'supply_off': 0.0, 'supply_double': 2.0}
+
 BROWNOUT_TIME = 300         # ms that a brownout takes; then the board starts anew
 BROWNOUT_SUPPLY = 0.2       # share of the nominal supply during it
 
@@ -57,11 +63,17 @@ class SimulatedBoard:
         How much faster than the wall's clock somebody lets time pass here; only told to the host.
     brownout : float, optional
         Time in s at which the supply breaks down for a moment and the board starts anew.
+    clock_back : float, optional
+        Time in s at which the board's clock jumps back by `CLOCK_JUMP`.
+    encoder_jump : float, optional
+        Time in s at which the encoder jumps by `JUMP_COUNTS`.
 
     Attributes
     ----------
     arm : object
         The arm.
+    troubled : callable
+        Whether a trouble is there now, by its name; see `hysteresis_ros.laboratory.board.url`.
     duty, enabled, faults
         As in the telemetry.
     time : int
@@ -72,8 +84,14 @@ class SimulatedBoard:
     """
 
     def __init__(self, arm: Arm, supply: float = 12.0, seed: int = 0, speed: float = 1.0,
-                 brownout: float = math.inf) -> None:
+                 brownout: float = math.inf, clock_back: float = math.inf,
+                 encoder_jump: float = math.inf) -> None:
         self.arm = arm
+        self.troubled: Callable[[str], bool] = lambda name: False
+        self._clock_back = 1000.0 * clock_back
+        self._encoder_jump = 1000.0 * encoder_jump
+        self._still = self._turned = 0      # counts at which the encoder stands, or turned round
+        self._was_still = self._was_reversed = False
         self._nominal_supply = supply
         self._random = random.Random(seed)
         self._speed = speed
@@ -101,11 +119,12 @@ class SimulatedBoard:
         self._next_remark = 0
         self._last_set = 0
         self._accepted: int | None = None
-        self._counter_zero = self._last_counts = self.arm.encoder_counts
+        self._counter_zero = self._last_counts = self._encoder_counts()
         if self._boot == 1:
             self._counter_zero = 0      # the encoder was set to zero when the arm was built
         self._index = 0
         self._latch: int | None = None
+        self._last_telemetry: Fields | None = None
         self._remark(f'simulated PWM board, protocol {VERSION}; say "hello 1*'
                      + encode(HELLO, 1).decode('ascii').strip().partition('*')[2] + '"')
 
@@ -113,7 +132,10 @@ class SimulatedBoard:
     def supply(self) -> float:
         """Supply voltage in V now."""
         low = 0.0 <= self._world_time - self._brownout < BROWNOUT_TIME
-        return self._nominal_supply * (BROWNOUT_SUPPLY if low else 1.0)
+        share = BROWNOUT_SUPPLY if low else 1.0
+        for trouble, its_share in SUPPLY_TROUBLES.items():
+            share *= its_share if self.troubled(trouble) else 1.0
+        return self._nominal_supply * share
 
     def receive(self, data: bytes) -> None:
         """
@@ -157,9 +179,12 @@ class SimulatedBoard:
         """
         for _ in range(ticks):
             self._look_at_supply()
-            self.arm.advance(TICK / 1000.0, self.supply * math.sqrt(self.duty))
+            duty = 1.0 if self.troubled('mosfet_stuck') else self.duty
+            self.arm.advance(TICK / 1000.0, self.supply * math.sqrt(duty))
             self._world_time += TICK
             self.time += TICK
+            if 0.0 <= self._world_time - self._clock_back < TICK:
+                self._jump_back()
             self._count()
             if 0.0 <= self._world_time - self._brownout - BROWNOUT_TIME < TICK:
                 self.start()
@@ -184,6 +209,29 @@ class SimulatedBoard:
             self.arm.advance(TICK / 1000.0, 0.0)
             self._world_time += TICK
 
+    def _jump_back(self) -> None:
+        """Set the clock back; what the firmware measures by differences of it goes on."""
+        self.time -= CLOCK_JUMP
+        self.next_telemetry -= CLOCK_JUMP
+        self._next_ambient -= CLOCK_JUMP
+        self._next_remark -= CLOCK_JUMP
+        self._last_set -= CLOCK_JUMP
+
+    def _encoder_counts(self) -> int:
+        """Return the counts of the encoder with its troubles."""
+        counts = self.arm.encoder_counts
+        if self.troubled('encoder_still'):
+            if not self._was_still:
+                self._still = counts
+            counts = self._still
+        self._was_still = self.troubled('encoder_still')
+        if self.troubled('encoder_reversed'):
+            if not self._was_reversed:
+                self._turned = counts
+            counts = 2 * self._turned - counts
+        self._was_reversed = self.troubled('encoder_reversed')
+        return counts + (JUMP_COUNTS if self._world_time >= self._encoder_jump else 0)
+
     def _look_at_supply(self) -> None:
         if self.supply < LOWEST_SUPPLY:
             self.duty = 0.0
@@ -193,25 +241,29 @@ class SimulatedBoard:
 
     def _count(self) -> None:
         """Watch the encoder for its index pulse, as the counter's hardware does."""
-        counts = self.arm.encoder_counts
+        counts = self._encoder_counts()
         before = (self._last_counts - INDEX_COUNTS) // COUNTS_PER_REVOLUTION
         now = (counts - INDEX_COUNTS) // COUNTS_PER_REVOLUTION
         self._last_counts = counts
-        if now != before:
+        if now != before and not self.troubled('index_missing'):
             self._index = (self._index + 1) % SEQUENCE_LIMIT
             self._latch = (max(now, before) * COUNTS_PER_REVOLUTION + INDEX_COUNTS
                            - self._counter_zero)
 
     def _send_telemetry(self) -> None:
+        if self._last_telemetry is not None and self.troubled('frozen'):
+            self._send(TELEMETRY, self._last_telemetry)
+            return
         ambient = None
         if self.time >= self._next_ambient:
             self._next_ambient = self.time + AMBIENT_PERIOD
             ambient = self.arm.ambient_temperature
-        self._send(TELEMETRY, Telemetry(
-            time=self.time % TIME_LIMIT, counts=self.arm.encoder_counts - self._counter_zero,
+        self._last_telemetry = Telemetry(
+            time=self.time % TIME_LIMIT, counts=self._encoder_counts() - self._counter_zero,
             supply=max(self.supply + self._random.gauss(0.0, SUPPLY_NOISE), 0.0), duty=self.duty,
             enabled=self.enabled, faults=tuple(sorted(self.faults)), index=self._index,
-            latch=self._latch, ambient=ambient, accepted=self._accepted).fields())
+            latch=self._latch, ambient=ambient, accepted=self._accepted).fields()
+        self._send(TELEMETRY, self._last_telemetry)
 
     def _send(self, kind: str, fields: Fields) -> None:
         self._outgoing += encode(kind, self._sequence, fields)
@@ -264,7 +316,7 @@ class SimulatedBoard:
         self.faults.discard('watchdog')
 
     def _on_zero(self, frame: Frame) -> None:
-        self._counter_zero = self.arm.encoder_counts
+        self._counter_zero = self._encoder_counts()
         self._index = 0
         self._latch = None
 
