@@ -71,6 +71,7 @@ class Bridge:
 
     def values(self):
         """Return the latest values of the diagnostics."""
+        self.graph.until(lambda: self.statuses, 'diagnostics')
         return {pair.key: pair.value for pair in self.statuses[-1].values}
 
 
@@ -198,6 +199,16 @@ def test_initialise_heats_and_cools(bridge, graph):
     one.hold(2.0, lambda: one.last() == pytest.approx(2.0, abs=0.02), 'setpoints to count again')
 
 
+def test_initialise_waits_for_a_board_that_is_being_enabled(bridge, graph):
+    """As right after the start, when the first telemetry says that it is not enabled yet."""
+    client = graph.probe.create_client(Trigger, '/hardware_bridge/initialise')
+    one = bridge('sim://bicep', telemetry_rate=2.0, start_enabled=True)
+    graph.until(lambda: one.joints and client.service_is_ready(), 'telemetry and the service')
+    answer = client.call_async(Trigger.Request())
+    graph.until(lambda: answer.done() or one.last() > 5.0, 'heating')
+    assert not answer.done() and one.last() > 5.0
+
+
 def test_initialise_ends_when_the_output_is_switched_off(bridge, graph):
     """The caller hears why."""
     one = bridge()
@@ -222,8 +233,12 @@ def test_board_that_is_unplugged_meanwhile(bridge, graph):
     answer = graph.call(SetBool, '/hardware_bridge/enable', SetBool.Request(data=True))
     assert not answer.success and 'not enabled' in answer.message
     graph.until(lambda: len(one.clocks) > before + 3, 'the clock')
-    one.says('started anew', WARN)
-    graph.until(lambda: one.values()['enabled'] == 'True', 'the board to be enabled again')
+    graph.until(lambda: 'started anew' in one.statuses[-1].message, 'the board')
+    one.says('lost while it was enabled; the output is off until ~/enable', ERROR)
+    for _ in range(5):      # whoever sends setpoints knows nothing of it
+        one.ask(3.0)
+        graph.spin(0.1)
+    assert one.values()['enabled'] == 'False' and one.last() == 0.0
     answer = graph.call(SetBool, '/hardware_bridge/enable', SetBool.Request(data=True))
     assert answer.success
     graph.until(lambda: one.statuses[-1].level == OK, 'the doubt to go')
@@ -235,7 +250,64 @@ def test_board_that_goes_silent(bridge, graph):
                  telemetry_rate=10.0)
     one.hold(3.0, lambda: one.last() > 0.0, 'the voltage')
     one.says('the board is silent', ERROR)
-    graph.until(lambda: one.statuses[-1].level == OK, 'the board to come back')
+    graph.until(lambda: one.values()['online'] == 'True', 'the board to come back')
+    one.says('lost while it was enabled; the output is off until ~/enable', ERROR)
+    assert graph.call(SetBool, '/hardware_bridge/enable', SetBool.Request(data=True)).success
+    graph.until(lambda: one.statuses[-1].level == OK, 'the fault to go')
+
+
+def test_limits_of_the_muscle_are_shown_and_can_be_switched_off(bridge, graph):
+    """Each by its parameter alone; what is off is said to be off."""
+    one = bridge()
+    one.hold(5.0, lambda: one.last() > 4.9, 'the voltage')
+    graph.until(lambda: float(one.values()['RMS voltage [V]']) > 0.5, 'the power')
+    values = one.values()
+    assert float(values['estimated temperature [degC]']) > 25.0
+    assert [values[name] for name in (
+        'maximum_voltage [V]', 'maximum_temperature [degC]', 'rms_voltage_limit [V]',
+        'full_heat_time [s]', 'soft_start_time [s]', 'encoder_check')] == [
+        '6', '150', '6.5', '1800', '0.2', 'on']
+    request = SetParameters.Request(parameters=[
+        Parameter(name, value=value).to_parameter_msg() for name, value in (
+            ('maximum_temperature', 0.0), ('rms_voltage_limit', 0.0), ('full_heat_time', 0.0),
+            ('soft_start_time', 0.0), ('encoder_check', False))])
+    answer = graph.call(SetParameters, '/hardware_bridge/set_parameters', request)
+    assert all(result.successful for result in answer.results)
+    graph.until(lambda: one.values()['maximum_temperature [degC]'] == 'off', 'the new values')
+    assert [one.values()[name] for name in (
+        'rms_voltage_limit [V]', 'full_heat_time [s]', 'soft_start_time [s]',
+        'encoder_check')] == ['off'] * 4
+
+
+def test_a_muscle_that_gets_too_warm_gets_less_voltage(bridge, graph):
+    """By the identified thermal law: 60 degC are reached with 3.7 V above 22 degC."""
+    one = bridge(maximum_temperature=60.0, encoder_check=False)
+    one.hold(6.0, lambda: one.last() == pytest.approx(math.sqrt((60.0 - 22.0) / 2.7), abs=0.1),
+             'the limit')
+    one.says('degC allowed (maximum_temperature)', ERROR)
+
+
+def test_full_heat_for_too_long_switches_off(bridge, graph):
+    """Until somebody enables it again."""
+    one = bridge(full_heat_time=40.0)
+    one.hold(6.0, lambda: any('40 s are allowed (full_heat_time); the output is off until ~/enable'
+                              in status.message for status in one.statuses), 'the end')
+    graph.until(lambda: one.last() == 0.0, 'zero')
+
+
+def test_an_encoder_that_stands_still_ends_the_heating(bridge, graph):
+    """The setpoints go on, and are not followed until somebody says that there is no arm."""
+    one = bridge('sim://bicep?speed=10&encoder_still_after=0')
+    one.hold(6.0, lambda: any('the angle stands still' in status.message and status.level == ERROR
+                              for status in one.statuses), 'the fault')
+    graph.until(lambda: one.last() == 0.0, 'zero')
+    one.says('set encoder_check to false where there is no arm', ERROR)
+    answer = graph.call(SetParameters, '/hardware_bridge/set_parameters', SetParameters.Request(
+        parameters=[Parameter('encoder_check', value=False).to_parameter_msg()]))
+    assert answer.results[0].successful
+    assert graph.call(SetBool, '/hardware_bridge/enable', SetBool.Request(data=True)).success
+    one.hold(6.0, lambda: float(one.values()['estimated temperature [degC]']) > 100.0, 'the heat')
+    assert 'stands still' not in one.statuses[-1].message
 
 
 def test_board_that_does_not_hear(bridge, graph):
@@ -311,7 +383,8 @@ def test_parameters_that_make_no_sense_are_refused_at_start(graph):
             ('telemetry_rate', 1000.0, 'from 0.1 to 200 Hz'),
             ('telemetry_rate', 1.0, 'at least two periods'),
             ('supply_voltage', math.nan, 'supply_voltage'), ('setpoint_timeout', 0.0, '0.05'),
-            ('minimum_voltage', 6.0, 'below the larger')):
+            ('minimum_voltage', 6.0, 'below the larger'), ('full_heat_time', 20.0, 'at least the'),
+            ('maximum_temperature', 30.0, 'above 40 degC')):
         with pytest.raises(ParameterError) as error:
             BridgeNode(context=graph.context, parameter_overrides=[Parameter(name, value=value)])
         assert words in str(error.value) and '\n' not in str(error.value)

@@ -9,10 +9,15 @@ board's watchdog knows that the host lives. Nobody who calls `Board` ever waits 
 
 Two watchdogs cut the muscle off. The host's: no `Board.set_voltage` within ``timeouts.setpoint``,
 and 0 is sent. The board's: no setpoint within ``timeouts.watchdog``, and it stops on its own.
+
+What must not be heated again by a program that knows nothing of it switches the output off for
+good, until `Board.clear_fault` and `Board.enable`: a board that was lost or started anew, an angle
+in doubt, and whatever `Protection` or the board's own duty shows. `Status.fault` says what it was.
 """
 
 from __future__ import annotations
 
+import collections
 from collections.abc import Callable
 import threading
 import time
@@ -24,8 +29,9 @@ from hysteresis_ros.bridge.board_state import Sample, Status
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.messages import (
     DISABLE, ENABLE, FAULTS, Identity, NO, SET, Telemetry, TELEMETRY)
+from hysteresis_ros.bridge.protection import Protection
 from hysteresis_ros.bridge.pwm import Pwm
-from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError
+from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError, RangeError
 
 if TYPE_CHECKING:
     from hysteresis_ros.bridge.protocol import Fields
@@ -33,6 +39,10 @@ if TYPE_CHECKING:
 SUPPLY_SAMPLES = 50         # measurements of the supply over which is averaged, about
 SUPPLY_JUMP = 0.03          # relative change that is taken at once
 STOP_PATIENCE = 0.5         # s to wait on the way out until the board says that it is off
+RAMP_DT = 0.02              # s of the wall between two setpoints of a soft start
+SAME_DUTY = 0.004           # a step of a board with 255 of them
+FOREIGN_SAMPLES = 2.0       # samples with a duty that nobody here asked for
+FOREIGN_DECAY = 0.25        # of one of them that a good sample makes up for
 
 
 class Board:
@@ -60,11 +70,15 @@ class Board:
         a wrong measurement would burn the muscle.
     on_sample : callable, optional
         Called with each `Sample`, in the reading thread.
+    protection : Protection, optional
+        What keeps the muscle from harm; by default with all of its limits.
 
     Attributes
     ----------
     pwm : Pwm
         May be replaced at any time.
+    protection : Protection
+        As given.
 
     Raises
     ------
@@ -76,9 +90,11 @@ class Board:
     What goes wrong shows in `status`, never as an exception of the threads:
 
     * the port does not exist: ``problem`` says so, and opening is tried again for ever;
-    * the board falls silent or is unplugged: likewise, after ``timeouts.telemetry``; the output
-      stays at zero after that until a new setpoint comes;
-    * the board starts anew: it is greeted and enabled again, the encoder's fault is in the samples;
+    * the board falls silent, repeats itself or is unplugged: likewise, after
+      ``timeouts.telemetry``; nothing is heated already after ``timeouts.late``, and again only
+      when it has been enabled again;
+    * the board starts anew: it is greeted again and stays disabled; the encoder's fault is in the
+      samples;
     * the supply is off or weak: ``limit`` says what the muscle gets instead.
 
     """
@@ -87,8 +103,10 @@ class Board:
                  encoder: Encoder | None = None, timeouts: Timeouts = Timeouts(),
                  telemetry_period: float = 0.1, supply: float = 12.0,
                  supply_tolerance: float = 0.25,
-                 on_sample: Callable[[Sample], None] = lambda sample: None) -> None:
+                 on_sample: Callable[[Sample], None] = lambda sample: None,
+                 protection: Protection | None = None) -> None:
         self.pwm = pwm
+        self.protection = protection or Protection()
         self._encoder = encoder or Encoder()
         self._timeouts = timeouts
         self._period = telemetry_period
@@ -101,6 +119,8 @@ class Board:
         self._stopping = threading.Event()
         self._news = False          # something for the writer
         self._wanted = False        # whether the board shall be enabled
+        self._fault = ''            # why it shall not
+        self._refused_since: float | None = None    # wall time of the first refusal after it
         # (voltage, wall time at which it was set)
         self._target: tuple[float, float] | None = None
         self._online = False
@@ -112,6 +132,10 @@ class Board:
         self._sample: Sample | None = None
         self._received = 0.0        # wall time of the latest sample
         self._limit = ''
+        self._ramping = False       # a soft start is on its way up
+        # (wall time, duty) of what was sent of late, and how many samples showed another duty.
+        self._duties: collections.deque[tuple[float, float]] = collections.deque()
+        self._foreign = 0.0
         self._refusal = ''
         self._connections = 0
         self._threads = [threading.Thread(target=target, name=name, daemon=True)
@@ -179,12 +203,20 @@ class Board:
         Raises
         ------
         RangeError
-            If it is not finite or outside the limits; the setpoint before stays.
+            If it is not finite or outside the limits; the setpoint before stays for
+            ``timeouts.refused``.
 
         """
-        self.pwm.check(voltage)
+        try:
+            self.pwm.check(voltage)
+        except RangeError:
+            with self._wake:
+                if self._refused_since is None:
+                    self._refused_since = time.monotonic()
+            raise
         with self._wake:
             self._target = (voltage, time.monotonic())
+            self._refused_since = None
             self._tell_writer()
 
     def set_zero(self) -> None:
@@ -201,18 +233,28 @@ class Board:
         ----------
         wanted : bool
             What shall be; `Sample.enabled` says what is. After enabling, the output is zero until
-            a new setpoint comes.
+            a new setpoint comes. Nothing is enabled before `clear_fault` where there is a fault.
 
         """
         with self._wake:
-            self._wanted = wanted
+            self._wanted = wanted and not self._fault
             self._target = None
             self._limit = ''
             self._tell_writer()
 
     def clear_fault(self) -> None:
-        """Clear the fault of the encoder's angle, because somebody has checked it."""
-        self._encoder.clear_fault()
+        """Clear what has switched the output off, because somebody has checked it."""
+        with self._wake:
+            self._encoder.clear_fault()
+            self.protection.clear()
+            self._duties.clear()
+            self._foreign = 0.0
+            self._fault = ''
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the output shall be enabled."""
+        return self._wanted
 
     @property
     def slowness(self) -> float:
@@ -234,9 +276,9 @@ class Board:
                 self._online, self._problem,
                 '; '.join(f'{name}: {FAULTS.get(name, "see the board")}'
                           for name in sample.faults) if sample else '',
-                self._limit, self._target is not None and self._expired(), self._refusal, sample,
-                self._identity, self._link.decoder.frames, self._link.decoder.bad_lines,
-                self._link.lost_frames, self._connections,
+                self._limit, self._target is not None and self._expired(), self._fault,
+                self._refusal, sample, self._identity, self._link.decoder.frames,
+                self._link.decoder.bad_lines, self._link.lost_frames, self._connections,
                 f'"{bad.text}": {bad.reason}' if bad else '')
 
     def _tell_writer(self) -> None:
@@ -246,7 +288,22 @@ class Board:
     def _expired(self) -> bool:
         if self._target is None:
             return True
-        return time.monotonic() - self._target[1] > self._timeouts.setpoint * self.slowness
+        now = time.monotonic()
+        if (self._refused_since is not None
+                and now - self._refused_since > self._timeouts.refused * self.slowness):
+            return True
+        return now - self._target[1] > self._timeouts.setpoint * self.slowness
+
+    def _late(self) -> bool:
+        """Whether the telemetry is so late that nothing may be heated."""
+        if self.speed > 1.0:
+            return False
+        patience = max(self._timeouts.late, 2.5 * self._period)
+        return time.monotonic() - self._received > patience * self.slowness
+
+    def _board_time(self) -> float:
+        """Return the board's time now, in s, as far as it can be told."""
+        return self._clock.time + (time.monotonic() - self._received) * self.speed
 
     # The reading thread
 
@@ -295,6 +352,8 @@ class Board:
                 if frame.kind != TELEMETRY:
                     continue
                 telemetry = Telemetry.from_frame(frame)
+                if self._sample is not None and self._online and self._clock.same(telemetry.time):
+                    continue    # a line that came twice tells nothing of now
                 if self._clock.back(telemetry.time):
                     self._lose(f'port {self._link.port}: the board has started anew')
                     return
@@ -302,8 +361,8 @@ class Board:
             if self._write_problem is not None:
                 raise self._write_problem
             if time.monotonic() - self._received > patience:
-                raise BoardError(f'port {self._link.port}: the board is silent, no telemetry for '
-                                 f'{patience:.3g} s; the output is off')
+                raise BoardError(f'port {self._link.port}: the board is silent, no new telemetry '
+                                 f'for {patience:.3g} s; the output is off')
 
     def _take(self, telemetry: Telemetry) -> None:
         reading = self._encoder.update(self._clock.follow(telemetry.time), telemetry.counts,
@@ -321,7 +380,35 @@ class Board:
             self._problem = ''
             self._sample = sample
             self._received = time.monotonic()
+            fault = self.protection.observe(sample) or self._foreign_duty(telemetry.duty)
+            if fault:
+                self._trip(fault)
         self._on_sample(sample)
+
+    def _foreign_duty(self, duty: float) -> str:
+        """Return what is wrong if the board applies a duty for which nobody here asked."""
+        # For so long may one be on its way.
+        longest = max(self._timeouts.telemetry, 3.0 * self._period)
+        oldest = time.monotonic() - longest * self.slowness
+        # One stands until the next was sent, however long that took.
+        while len(self._duties) > 1 and self._duties[1][0] < oldest:
+            self._duties.popleft()
+        if duty <= SAME_DUTY or any(abs(duty - one) <= SAME_DUTY for _, one in self._duties):
+            self._foreign = max(self._foreign - FOREIGN_DECAY, 0.0)
+            return ''
+        self._foreign += 1.0
+        if self._foreign < FOREIGN_SAMPLES:
+            return ''
+        return (f'the board applies a duty of {duty:.3f}, for which this program did not ask: '
+                'another one talks to it, or the line delays its words; end the other one')
+
+    def _trip(self, fault: str) -> None:
+        """Switch the output off until `clear_fault` and `enable`."""
+        if not self._fault:
+            self._fault = fault
+        self._wanted = False
+        self._target = None
+        self._tell_writer()
 
     def _smooth(self, supply: float) -> float:
         """Return the supply's average, so that its noise does not move the muscle to and fro."""
@@ -336,10 +423,14 @@ class Board:
 
     def _lose(self, problem: str) -> None:
         with self._wake:
+            if self._online and self._wanted:
+                self._trip('the board was lost while it was enabled')
             self._online = False
             self._problem = problem
             self._target = None
             self._limit = ''
+            self._duties.clear()
+            self._foreign = 0.0
         self._say_zero()
 
     # The writing thread
@@ -348,7 +439,7 @@ class Board:
         while True:
             with self._wake:
                 self._wake.wait_for(lambda: self._news or self._stopping.is_set(),
-                                    self._timeouts.keepalive)
+                                    RAMP_DT if self._ramping else self._timeouts.keepalive)
                 self._news = False
                 if self._stopping.is_set():
                     return
@@ -366,12 +457,20 @@ class Board:
             return (ENABLE if self._wanted else DISABLE, None)
         if not self._wanted:
             return None
-        return (SET, {'duty': self._duty()})
+        duty = self._duty()
+        self._duties.append((time.monotonic(), duty))
+        return (SET, {'duty': duty})
 
     def _duty(self) -> float:
         self._limit = ''
+        self._ramping = False
         supply = self._supply
         if self._target is None or supply is None or self._expired():
+            self.protection.rest()
+            return 0.0
+        if self._late():
+            self.protection.rest()
+            self._limit = 'the telemetry is late: output off until it comes again'
             return 0.0
         off = abs(supply - self._nominal_supply)
         if off > self._supply_tolerance * self._nominal_supply:
@@ -379,8 +478,12 @@ class Board:
                 f'the supply measures {supply:.3g} V, {self._nominal_supply:g} V expected: '
                 'output off; check the supply and the parameter supply_voltage')
             return 0.0
-        drive = self.pwm.drive(self._target[0], supply)
-        self._limit = drive.limit
+        voltage, protected, self._ramping = self.protection.limit(
+            self._target[0], self._board_time(), RAMP_DT * self.speed,
+            2.0 * self._timeouts.keepalive * self.speed)
+        # Below minimum_voltage there is nothing but off.
+        drive = self.pwm.drive(voltage if voltage >= self.pwm.minimum_voltage else 0.0, supply)
+        self._limit = drive.limit or protected
         return drive.duty
 
     def _say_zero(self) -> None:

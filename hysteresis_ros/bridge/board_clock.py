@@ -52,6 +52,22 @@ class BoardClock:
         """
         return (milliseconds - self._last) % TIME_LIMIT >= TIME_LIMIT // 2
 
+    def same(self, milliseconds: int) -> bool:
+        """
+        Tell whether the board's clock has stood still.
+
+        Parameters
+        ----------
+        milliseconds : int
+            The board's clock.
+
+        Returns
+        -------
+        bool
+
+        """
+        return milliseconds == self._last
+
     def follow(self, milliseconds: int) -> float:
         """
         Take a reading.

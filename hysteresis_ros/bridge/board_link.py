@@ -20,6 +20,8 @@ HANDLERS = 'hysteresis_ros.bridge.urlhandlers'
 if HANDLERS not in serial.protocol_handler_packages:
     serial.protocol_handler_packages.append(HANDLERS)
 
+# Ports that end at the virtual laboratory's arm.
+SIMULATED = ('sim', 'avr')
 READ_TIMEOUT = 0.05     # s; how late the reader notices that it is to stop
 LARGEST_READ = 4096
 LARGEST_GAP = 1000      # frames; a larger one is a board that started anew
@@ -46,8 +48,14 @@ class Timeouts:
     ----------
     setpoint : float
         Without `Board.set_voltage` for so long, the output goes to zero.
+    refused : float
+        A setpoint that a refused one follows is held for so long, unless a good one comes.
     telemetry : float
         Without telemetry for so long, the board counts as lost.
+    late : float
+        Without telemetry for so long, nothing is heated; with telemetry slower than that, 2.5
+        periods. A board that runs faster than the wall's clock burns nothing: there `telemetry`
+        counts alone.
     watchdog : float
         Without a frame from the host for so long, the board switches off on its own.
     keepalive : float
@@ -64,8 +72,10 @@ class Timeouts:
     """
 
     setpoint: float = 2.0
+    refused: float = 0.3
     telemetry: float = 1.0
-    watchdog: float = 1.0
+    late: float = 0.4
+    watchdog: float = 0.5
     keepalive: float = 0.1
     greeting: float = 3.0
     answer: float = 0.3
@@ -112,10 +122,11 @@ class BoardLink:
         self._sequence = 0
         self._bytes = 0
         self._writing = threading.Lock()
-        if port.lower().startswith('sim://'):
+        scheme = port.lower().partition('://')[0]
+        if scheme in SIMULATED:
             # pyserial takes a handler that fails to import for one that is not there, and reads
             # the URL only when the port is opened.
-            importlib.import_module(f'{HANDLERS}.protocol_sim')
+            importlib.import_module(f'{HANDLERS}.protocol_{scheme}')
             from hysteresis_ros.laboratory.board.url import check_url
             check_url(port)
         self._settings = {'baudrate': baud, 'timeout': READ_TIMEOUT,

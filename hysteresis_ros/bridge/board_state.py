@@ -62,6 +62,8 @@ class Status(NamedTuple):
         Why the output is less than asked for, or ''.
     expired : bool
         Whether the setpoint is too old, so that 0 is sent.
+    fault : str
+        Why the output was switched off until it is enabled again, or ''.
     refusal : str
         The board's latest refusal, or ''.
     sample : Sample or None
@@ -80,6 +82,7 @@ class Status(NamedTuple):
     faults: str
     limit: str
     expired: bool
+    fault: str
     refusal: str
     sample: 'Sample | None'
     identity: 'Identity | None'

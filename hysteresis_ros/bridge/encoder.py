@@ -21,6 +21,7 @@ AMT103_COUNTS = 4 * AMT103_PULSES
 
 INDEX_USES = ('ignore', 'check', 'home')
 INDEX_TOLERANCE = 4   # counts: one quadrature cycle, the width of the index pulse
+INDEX_MARGIN = 16       # counts beyond its place within which the index pulse must have come
 
 
 class Reading(NamedTuple):
@@ -115,6 +116,8 @@ class Encoder:
         self._history: collections.deque[tuple[float, int]] = collections.deque()
         self._index: int | None = None
         self._index_position: int | None = None
+        # Between which two places of the index the arm was, and the number of pulses by then.
+        self._sector: tuple[int | None, int] = None, 0
         self._fault = ''
 
     def restart(self) -> None:
@@ -133,6 +136,7 @@ class Encoder:
         """Clear the fault of the angle, because somebody has checked it."""
         self._fault = ''
         self._index_position = None
+        self._sector = None, 0
 
     @property
     def angle(self) -> float | None:
@@ -161,7 +165,7 @@ class Encoder:
 
         """
         if not self._begun or self._restarted:
-            self._begin(time, counter)
+            self._begin(time, counter, index)
             self._look_at_index(counter, index, latch)
             return self._reading(True, '')
         change = self._wrap(counter - self._counter)
@@ -180,15 +184,17 @@ class Encoder:
         self._time = time
         self._remember(time)
         self._look_at_index(counter, index, latch)
+        self._look_for_missing_index(index)
         return self._reading(True, '')
 
-    def _begin(self, time: float, counter: int) -> None:
+    def _begin(self, time: float, counter: int, index: int) -> None:
         if not self._restarted:
             self._position = self._wrap(counter)
         self._begun = True
         self._counter = counter
         self._time = time
         self._index = None
+        self._sector = None, index
         self._suspect = None
         self._restarted = False
         self._history.clear()
@@ -220,6 +226,20 @@ class Encoder:
         self._index = index
         self._at_index(self._position - self._wrap(counter - latch))
 
+    def _look_for_missing_index(self, index: int) -> None:
+        """Find out whether the arm has passed the place of the index pulse without one."""
+        if self._index_use == 'ignore' or self._index_position is None:
+            return
+        turn, (sector, since) = self._counts_per_revolution, self._sector
+        turns, beyond = divmod(self._position - self._index_position, turn)
+        if not INDEX_MARGIN < beyond < turn - INDEX_MARGIN:
+            return      # too near to the place to tell
+        self._sector = turns, index
+        if sector is not None and turns != sector and index == since:
+            self._fault = ('the arm has passed the place of the index pulse and none came: counts '
+                           'were lost or the index is not connected, the angle may be off; check '
+                           'cable and coupling')
+
     def _at_index(self, position: int) -> None:
         """Compare or correct the position with the index pulse that came at `position`."""
         expected, first = self._index_position, self._index_position is None
@@ -240,6 +260,7 @@ class Encoder:
 
     def _move(self, counts: int) -> None:
         self._position += counts
+        self._sector = None, 0
         self._history = collections.deque(
             (time, position + counts) for time, position in self._history)
 

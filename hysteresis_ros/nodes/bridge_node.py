@@ -8,9 +8,11 @@ and, on a simulated board that does not live at real time, ``/clock``. The port 
 by threads of `Board`, so no callback ever waits for it; what the board measures is published from
 the reading thread at once.
 
-The output goes to zero when no setpoint came for ``setpoint_timeout``, when the board is silent
-for ``telemetry_timeout``, and first of all when the node ends. A setpoint that is no number or out
-of the limits never reaches the board and does not renew the one before.
+The output goes to zero when no setpoint came for ``setpoint_timeout``, when the compensator dies,
+when the board is silent for 0.4 s, and first of all when the node ends. A setpoint that is no
+number or out of the limits never reaches the board and does not renew the one before, which ends
+0.3 s later. After a board was lost or started anew, an angle in doubt, or whatever `Protection`
+forbids, ``~/enable`` has to be called before anything is heated again.
 
 It is a managed node. Inactive, it keeps the port open and the clock going, with the output off, and
 publishes and follows nothing; unconfigured, it has no port. After it was deactivated the output
@@ -35,10 +37,12 @@ from std_srvs.srv import SetBool, Trigger
 
 from hysteresis_ros.bridge.board import Board
 from hysteresis_ros.bridge.board_link import Timeouts
+from hysteresis_ros.bridge.protection import Protection
 from hysteresis_ros.bridge.stamps import RealStamps, SimulatedStamps
 from hysteresis_ros.errors import BoardError, RangeError
+from hysteresis_ros.nodes.alive import ALIVE, listen_for_death
 from hysteresis_ros.nodes.bridge_parameters import (
-    check, make_cycle, make_encoder, make_pwm, PARAMETERS)
+    check, make_cycle, make_encoder, make_limits, make_pwm, PARAMETERS)
 from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, OK, WARN
 from hysteresis_ros.nodes.lifecycle import ManagedNode
 from hysteresis_ros.nodes.parameters import Parameters
@@ -72,6 +76,7 @@ class BridgeNode(ManagedNode):
             self, self.PARAMETERS, check=check, changed=self._configure)
         self._board: Board | None = None     # only where it is configured
         self._works = False                 # for the reading thread: whether the node is active
+        self._wanted = parameters['start_enabled']
         self._lock = threading.Lock()   # of what callbacks and the reading thread share:
         # The heat and cool cycle that is running, and its end: (success, message).
         self._cycle: HeatAndCool | None = None
@@ -81,7 +86,6 @@ class BridgeNode(ManagedNode):
         self._wall = Clock(clock_type=ClockType.STEADY_TIME)
         # (is it so?, future, wall time until which to wait)
         self._waiting: list[tuple[Callable[[Status], bool], Any, float]] = []
-        self._wanted = parameters['start_enabled']
         self._taken = self._refused = 0
         self._bad_lines = (0, -BAD_LINES_SHOWN_FOR)
         self._joints = self.create_publisher(JointState, 'joint_states', MEASUREMENTS)
@@ -96,6 +100,8 @@ class BridgeNode(ManagedNode):
         self.create_service(SetBool, '~/enable', self._on_enable, callback_group=waiting)
         self.create_service(Trigger, '~/initialise', self._on_initialise, callback_group=waiting)
         self.create_timer(LOOK_PERIOD, self._look, clock=self._wall)
+        # No timeout of setpoints is as short as that of the node which gives them.
+        listen_for_death(self, f'hysteresis_compensator/{ALIVE}', self._on_death)
         if parameters['autostart']:
             self.start()
 
@@ -108,7 +114,8 @@ class BridgeNode(ManagedNode):
                      telemetry=parameters['telemetry_timeout'],
                      watchdog=parameters['board_watchdog']),
             1.0 / parameters['telemetry_rate'], parameters['supply_voltage'],
-            parameters['supply_tolerance'], self._on_sample)
+            parameters['supply_tolerance'], self._on_sample,
+            Protection(make_limits(parameters)))
         self._board.start()
 
     def activate(self) -> None:
@@ -156,6 +163,7 @@ class BridgeNode(ManagedNode):
     def _configure(self, parameters: Parameters) -> None:
         if self._board is not None:
             self._board.pwm = make_pwm(parameters)
+            self._board.protection.limits = make_limits(parameters)
 
     # Setpoints and services
 
@@ -175,6 +183,17 @@ class BridgeNode(ManagedNode):
             return
         self._taken += 1
         self._diagnostics.clear('setpoint')
+        self._diagnostics.clear('compensator')
+
+    def _on_death(self) -> None:
+        board = self._board
+        if board is None or not self._works or board.speed > 1.0:
+            return      # nothing can burn there, and a busy machine must not spoil the run
+        with self._lock:
+            if self._cycle is None:
+                board.set_zero()
+        self._diagnostics.set('compensator', ERROR, 'the compensator has died or hangs: the output '
+                              'is zero until the next setpoint')
 
     async def _on_enable(self, request: SetBool.Request,
                          response: SetBool.Response) -> SetBool.Response:
@@ -190,26 +209,31 @@ class BridgeNode(ManagedNode):
             response.message = f'not enabled: {status.problem or "there is no board yet"}'
             return response
         self._wanted = wanted
-        board.enable(wanted)
         if wanted:
             board.clear_fault()
+        board.enable(wanted)
         if not status.online:
             response.success = True
             response.message = 'disabled; the board is not there, and will stay off'
             return response
         response.success = await self._until(
-            lambda status: enabled(status) == wanted, ENABLE_PATIENCE)
+            lambda status: enabled(status) == wanted, ENABLE_PATIENCE * board.slowness)
         response.message = 'enabled' if wanted else 'disabled'
         if not response.success:
-            response.message = f'the board did not follow: {board.status.problem}'
+            status = board.status
+            response.message = f'the board did not follow: {status.problem or status.fault}'
         return response
 
     async def _on_initialise(self, request: Trigger.Request,
                              response: Trigger.Response) -> Trigger.Response:
-        if self._board is None or not self._works:
+        board = self._board
+        if board is None or not self._works:
             response.message = f'not begun: the node is {self.state}; activate it first'
             return response
-        status = self._board.status
+        if board.wanted and board.status.online:    # at the start, it is being enabled just now
+            await self._until(lambda status: bool(enabled(status)) or not board.wanted,
+                              ENABLE_PATIENCE * board.slowness)
+        status = board.status
         if not enabled(status):
             response.message = f'not begun: {status.problem or "the output is not enabled"}'
             return response
@@ -299,18 +323,19 @@ class BridgeNode(ManagedNode):
         if not self.context.ok():
             return
         self._tell('lifecycle', OK, '' if self._works else f'the node is {self.state}')
-        if self._board is None:
-            for name in ('board', 'faults', 'supply', 'timeout', 'encoder', 'output', 'initialise',
-                         'lines'):
+        board = self._board
+        if board is None:
+            for name in ('board', 'faults', 'supply', 'timeout', 'encoder', 'fault', 'output',
+                         'initialise', 'lines'):
                 self._diagnostics.clear(name)
             return
-        status = self._board.status
+        status = board.status
         self._keep_clock(status)
         if not status.online:
             with self._lock:
                 if self._cycle is not None:
                     self._end_cycle(False, f'heat and cool cycle: {status.problem}')
-        self._judge(status)
+        self._judge(status, board.wanted)
         now = time.monotonic()
         waiting, self._waiting = self._waiting, []
         for condition, future, deadline in waiting:
@@ -331,7 +356,7 @@ class BridgeNode(ManagedNode):
                 self._clocks.publish(
                     ClockMessage(clock=_message(self._stamps.idle(time.monotonic()))))
 
-    def _judge(self, status: Status) -> None:
+    def _judge(self, status: Status, wanted: bool) -> None:
         sample = status.sample
         if not status.online and not status.problem:
             self._diagnostics.set('board', OK, f'looking for the board at '
@@ -345,7 +370,10 @@ class BridgeNode(ManagedNode):
                    'next one' if status.expired else '')
         self._tell('encoder', WARN, f'{sample.encoder_fault} (~/enable ends this warning)'
                    if sample and sample.encoder_fault else '')
-        self._tell('output', OK, '' if self._wanted else 'the output is disabled, see ~/enable')
+        self._tell('fault', ERROR, f'{status.fault}; the output is off until ~/enable'
+                   if status.fault else '')
+        self._tell('output', OK, '' if wanted or status.fault
+                   else 'the output is disabled, see ~/enable')
         self._tell('initialise', OK, f'heat and cool cycle: {self._progress}; setpoints are '
                    'refused' if self._cycle is not None else '')
         self._judge_lines(status)
@@ -387,7 +415,21 @@ class BridgeNode(ManagedNode):
                 'board time [s]': sample.time, 'angle [rad]': sample.angle,
                 'applied voltage [V]': sample.voltage, 'supply [V]': sample.supply,
                 'enabled': sample.enabled})
+        values.update(_protection_values(self._board.protection))
         return values
+
+
+def _protection_values(protection: Protection) -> dict[str, Any]:
+    limits = protection.limits
+    return {
+        'estimated temperature [degC]': protection.temperature,
+        'maximum_temperature [degC]': limits.maximum_temperature or 'off',
+        'RMS voltage [V]': protection.rms, 'rms_voltage_limit [V]': limits.rms_voltage or 'off',
+        'full heat [s]': protection.full_heat, 'full_heat_time [s]': limits.full_heat_time
+        or 'off',
+        'maximum_voltage [V]': limits.maximum_voltage,
+        'soft_start_time [s]': limits.soft_start_time or 'off',
+        'encoder_check': 'on' if limits.encoder_check else 'off'}
 
 
 def enabled(status: Status) -> bool | None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.heat_and_cool import HeatAndCool
+from hysteresis_ros.bridge.protection import Limits
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.nodes.lifecycle import LIFECYCLE
@@ -24,7 +25,7 @@ BOARD = (
          'slower of wall clock and board clock', 's', 0.05, 600.0, read_only=True),
     Spec('telemetry_timeout', 1.0, 'Time without telemetry after which the board counts as lost; '
          'by the slower clock', 's', 0.05, 600.0, read_only=True),
-    Spec('board_watchdog', 1.0, 'Time without a word from this node after which the board '
+    Spec('board_watchdog', 0.5, 'Time without a word from this node after which the board '
          'switches off on its own, by the slower clock; a board may do so earlier, that of '
          'firmware/ after 0.5 s', 's', 0.3, 60.0, read_only=True),
 )
@@ -54,6 +55,28 @@ ENCODER = (
          read_only=True),
 )
 
+PROTECTION = (
+    Spec('rms_voltage_limit', 6.5, 'Largest RMS of the voltage, which limits the mean heating '
+         'power; the voltage is lowered to keep it; 0 for none', 'V', 0.0, 48.0),
+    Spec('rms_window', 60.0, 'Time over which that is taken', 's', 0.1, 3600.0, read_only=True),
+    Spec('maximum_temperature', 150.0, 'Largest estimated temperature of the wires; the voltage '
+         'is lowered to keep it; 0 for none', 'degC', 0.0, 500.0),
+    Spec('thermal_gain', 2.7, 'Temperature of the wires above ambient per square of the voltage, '
+         'at rest, for that estimate', 'K/V^2', 0.001, 1000.0),
+    Spec('thermal_time_constant', 5.0, 'Time constant of warming and cooling, for that estimate',
+         's', 0.01, 600.0, read_only=True),
+    Spec('full_heat_time', 1800.0, 'Longest time at 95 % of maximum_voltage or more, after which '
+         'the output is off until ~/enable; 0 for any', 's', 0.0, 86400.0),
+    Spec('soft_start_time', 0.2, 'Time in which the voltage rises from off to maximum_voltage; 0 '
+         'for at once', 's', 0.0, 60.0),
+    Spec('encoder_check', True, 'Whether nothing is heated without an angle that can be believed '
+         'and that follows the heat; false without an arm, as on a bench'),
+    Spec('motion_temperature_rise', 60.0, 'Estimated temperature above ambient at which the arm '
+         'must have moved, for encoder_check', 'K', 1.0, 500.0),
+    Spec('angle_latency', 0.0, 'Time by which the angle may come late: so long after the end of '
+         'the heating, encoder_check takes no lift for a MOSFET that is stuck on', 's', 0.0, 60.0),
+)
+
 INITIALISATION = (
     Spec('initialise_voltage', 6.0, 'Heating voltage of ~/initialise, at most maximum_voltage',
          'V', 0.1, 48.0),
@@ -61,13 +84,23 @@ INITIALISATION = (
     Spec('initialise_cool_time', 60.0, 'Shortest cooling time of ~/initialise', 's', 1.0, 3600.0),
 )
 
-PARAMETERS = BOARD + OUTPUT + ENCODER + INITIALISATION + VOLTAGE_LIMITS + NAMES + LIFECYCLE
+PARAMETERS = (BOARD + OUTPUT + ENCODER + PROTECTION + INITIALISATION + VOLTAGE_LIMITS + NAMES
+              + LIFECYCLE)
 
 
 def make_pwm(values: Mapping[str, Any]) -> Pwm:
     """Return the law and limits between voltage and duty."""
     return Pwm(values['pwm_law'], values['minimum_voltage'], values['maximum_voltage'],
                values['maximum_duty'])
+
+
+def make_limits(values: Mapping[str, Any]) -> Limits:
+    """Return what the muscle stands."""
+    return Limits(
+        values['maximum_voltage'], values['rms_voltage_limit'], values['rms_window'],
+        values['maximum_temperature'], values['thermal_gain'], values['thermal_time_constant'],
+        values['full_heat_time'], values['soft_start_time'], values['encoder_check'],
+        values['motion_temperature_rise'], values['angle_latency'])
 
 
 def make_encoder(values: Mapping[str, Any]) -> Encoder:
@@ -88,6 +121,11 @@ def check(values: Mapping[str, Any]) -> None:
     """Refuse values that make no sense, alone or together, with a `ParameterError`."""
     make_pwm(values)
     make_encoder(values)
+    make_limits(values)
+    if 0.0 < values['full_heat_time'] < values['initialise_heat_time']:
+        raise ParameterError(
+            f'full_heat_time {values["full_heat_time"]:g} s has to be at least the '
+            f'initialise_heat_time of {values["initialise_heat_time"]:g} s, or 0')
     if values['telemetry_timeout'] * values['telemetry_rate'] < 2.0:
         raise ParameterError(
             f'telemetry_timeout {values["telemetry_timeout"]:g} s has to be at least two periods '

@@ -13,7 +13,8 @@ When the diagnostics say that the bridge of the same arm has begun to heat and c
 nothing warms the muscle again between the cycle's end and the next reference.
 
 A reference that names the muscle and gives no numbers lets it go: the setpoint is zero once, and
-nothing is repeated until the next reference.
+nothing is repeated until the next reference. So does the death of `geometry_node`, unless time is
+simulated.
 
 It is a managed node: configuring loads the model; deactivating lets the muscle go, and references
 count again from when the node is active.
@@ -33,6 +34,7 @@ from std_srvs.srv import Trigger
 from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
 from hysteresis_ros.errors import HysteresisError, ParameterError, RangeError
 from hysteresis_ros.kernels.warm_up import warm_up_controller
+from hysteresis_ros.nodes.alive import ALIVE, listen_for_death, promise_life
 from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, OK, WARN
 from hysteresis_ros.nodes.feedback import AngleFeedback
 from hysteresis_ros.nodes.lifecycle import LIFECYCLE, ManagedNode
@@ -119,6 +121,8 @@ class CompensatorNode(ManagedNode):
                 JointState, 'joint_states', self._on_joint_states, MEASUREMENTS)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self.create_service(Trigger, '~/reset', self._on_reset)
+        listen_for_death(self, f'bicep_geometry/{ALIVE}', self._on_death)
+        promise_life(self)
 
     def set_up(self) -> None:
         """Load the model and compile what runs on it."""
@@ -216,6 +220,7 @@ class CompensatorNode(ManagedNode):
             self._diagnostics.set('reference', WARN, f'reference not followed: {error}')
             return
         self._diagnostics.clear('reference')
+        self._diagnostics.clear('geometry')
         self._wanted, self._target = wanted, target
         if self._feedback:
             self._integral.begin(self._now())
@@ -225,6 +230,14 @@ class CompensatorNode(ManagedNode):
         """Switch the muscle off: without a drive it cools, and forgets what is above zero."""
         self._reset()
         self._publish(0.0)
+
+    def _on_death(self) -> None:
+        # In simulated time nothing burns, and a busy machine must not spoil the run.
+        if self._wanted is None or self.get_parameter('use_sim_time').value:
+            return
+        self._let_go()
+        self._diagnostics.set('geometry', ERROR, 'the geometry node has died or hangs: the muscle '
+                              'is switched off until the next reference')
 
     def _corrected(self, wanted: Reference) -> Reference:
         """Return the reference with the feedback's correction of the angle."""

@@ -33,6 +33,7 @@ from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.bicep.trajectory import Trajectory
 from hysteresis_ros.errors import RangeError
 from hysteresis_ros.nodes.commands import read_command, read_trajectory
+from hysteresis_ros.nodes.alive import promise_life
 from hysteresis_ros.nodes.diagnostics import Diagnostics, WARN
 from hysteresis_ros.nodes.parameters import (
     ANGLE_LIMITS, check_limits, GEOMETRY, MODEL, NAMES, Parameters, Spec, TARGETS)
@@ -97,6 +98,7 @@ class GeometryNode(Node):
         self.create_subscription(JointState, 'joint_states', self._on_joint_states, LATEST)
         self._timer = self.create_timer(1.0 / parameters['trajectory_rate'], self._go_on)
         self._timer.cancel()
+        promise_life(self)
 
     def on_shutdown(self) -> None:
         """Let the muscle go if somebody was moving it: nobody will take it to the end."""
