@@ -204,12 +204,12 @@ def test_a_bag_without_a_run_is_refused_in_one_line(tmp_path, messages, words):
 
 
 @pytest.mark.parametrize('storage', ['MCAP', 'SQLITE3'])
-@pytest.mark.parametrize('keep', [0, 20, 0.5])
+@pytest.mark.parametrize('keep', [0, 20, 0.1])
 def test_a_truncated_bag_is_refused_in_one_line(tmp_path, storage, keep):
     bag = write_bag(tmp_path / 'bag', run(), storage)
     file = next(p for p in bag.iterdir() if p.name != 'metadata.yaml')
     data = file.read_bytes()
-    file.write_bytes(data[:int(keep if keep != 0.5 else keep * len(data))])
+    file.write_bytes(data[:int(keep if keep != 0.1 else keep * len(data))])
     with pytest.raises(MeasurementError) as refused:
         read_measurement(bag)
     assert '\n' not in str(refused.value)

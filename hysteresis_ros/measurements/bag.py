@@ -91,16 +91,18 @@ def read_bag(path: AnyPath, namespace: str | None = None) -> Measurement:
     Warns
     -----
     MeasurementWarning
-        As `read_csv`.
+        As `read_csv`, and where the recording was cut off, as by a power failure: it is read up to
+        its last whole chunk.
 
     """
     path = Path(path)
     with open_bag(path) as bag:
         topics = choose_topics(path, bag.topics, namespace)
         recording = collect(path, bag, topics)
+        lost = bag.lost
     columns = arm_run(path, recording)
     measurement = Measurement.from_columns(columns, str(path), digest(path))
-    for note in measurement.warnings:
+    for note in [*filter(None, [lost]), *measurement.warnings]:
         warnings.warn(note, MeasurementWarning, stacklevel=2)
     return measurement
 

@@ -18,6 +18,8 @@ import rosbag2_py
 class Rosbag2Storage:
     """A recording read by ROS 2's own reader."""
 
+    lost = ''
+
     def __init__(self, path: Path) -> None:
         self.path = path
         compressed = self.compressed()

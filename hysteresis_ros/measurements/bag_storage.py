@@ -3,17 +3,19 @@
 """
 Raw messages of a rosbag2 recording, through `rosbags` or, without it, ROS 2's own `rosbag2_py`.
 
-Both give (topic, receive time, bytes).
+Both give (topic, receive time, bytes); so does `CutBag`, for a recording that was cut off.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
+import re
 from typing import Protocol, TYPE_CHECKING
 
 from hysteresis_ros.atomic import AnyPath
 from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.measurements.cut_bag import CutBag, is_cut_off
 from hysteresis_ros.spelling import short_list
 
 if TYPE_CHECKING:
@@ -23,9 +25,10 @@ SUFFIXES = ('.mcap', '.db3')
 
 
 class Storage(Protocol):
-    """A recording that is open: which topics it has, and their messages."""
+    """A recording that is open: its topics, their messages, and what is lost of it, or ''."""
 
     topics: dict[str, str]
+    lost: str
 
     def __enter__(self) -> Storage:
         ...
@@ -49,7 +52,7 @@ def open_bag(path: AnyPath) -> Storage:
 
     Returns
     -------
-    RosbagsStorage or Rosbag2Storage
+    RosbagsStorage, Rosbag2Storage or CutBag
         A context manager with `topics`, a dict from topic to type, and `messages(topics)`.
 
     Raises
@@ -59,6 +62,10 @@ def open_bag(path: AnyPath) -> Storage:
 
     """
     path = storage_of(Path(path))
+    files = [path] if path.is_file() else sorted(
+        (file for suffix in SUFFIXES for file in path.glob(f'*{suffix}')), key=_number)
+    if any(map(is_cut_off, files)):
+        return CutBag(path, files)
     try:
         from rosbags.rosbag2 import Reader
         return RosbagsStorage(path, Reader)
@@ -103,6 +110,12 @@ def storage_of(path: Path) -> Path:
     return whole
 
 
+def _number(file: Path) -> list[tuple[int, str]]:
+    """Return what sorts files by the numbers in their names, the tenth after the second."""
+    return [(int(part or 0), '') if k % 2 else (0, part)
+            for k, part in enumerate(re.split(r'(\d+)', file.name))]
+
+
 def instead(path: Path) -> str:
     """Say what a folder without a bag holds, and what to give instead."""
     tables = sorted(p.name for p in path.glob('*.csv'))
@@ -125,6 +138,8 @@ def damaged(path: Path, error: BaseException) -> MeasurementError:
 
 class RosbagsStorage:
     """A recording read by the package rosbags, without the message definitions inside it."""
+
+    lost = ''
 
     def __init__(self, path: Path, reader: type[Reader]) -> None:
         self.path = path
