@@ -9,6 +9,7 @@ DEMO_ARGS ?=
 BENCHMARK_ARGS ?=
 HIDDEN_ARGS ?=
 PYTEST_ARGS ?=
+FUZZ_ARGS ?=
 
 # The wheels of ROS 2 set this variable, and with it the library path, for one environment only.
 ifdef _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -51,7 +52,7 @@ IN_WORKSPACE := export PATH="$$PWD/$(VENV)/bin:$$PATH"; \
 	. ./$(WORKSPACE)/install/local_setup.sh; \
 	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)"
 
-.PHONY: help build demo test benchmark hidden docs pictures firmware clean force
+.PHONY: help build demo test benchmark hidden docs pictures firmware fuzz faults clean force
 
 help:
 	@echo 'make demo       the whole system on the simulated arm: identify, drive, record, compare'
@@ -61,6 +62,8 @@ help:
 	@echo 'make docs       the pages of docs/ with the programming interface, into build/docs'
 	@echo 'make pictures   the pictures of docs/ and of the README, made anew'
 	@echo 'make firmware   machine code for the board, see firmware/README.md'
+	@echo 'make fuzz       both parsers fed with what breaks them; FUZZ_ARGS=RUNS=10000000'
+	@echo 'make faults     the table of docs/safety.md, measured anew'
 	@echo 'make build      the workspace alone; make demo builds it, too'
 	@echo 'make clean      remove all that make made'
 	@echo 'Then, for `hysteresis` and `ros2 run hysteresis_ros ...` in this shell:'
@@ -93,7 +96,9 @@ $(WORKSPACE)/build/made: $(VENV)/made $(SOURCES) $(WORKSPACE)/build/sources
 build: $(WORKSPACE)/build/made
 
 demo: build
-	@$(IN_WORKSPACE) $(PREFIX)/lib/hysteresis_ros/hysteresis demo $(DEMO_ARGS)
+	@$(if $(findstring avr://,$(DEMO_ARGS)),$(MAKE) -s -C firmware machine)
+	@$(IN_WORKSPACE) HYSTERESIS_ROS_AVR="$$PWD/firmware/build" \
+		$(PREFIX)/lib/hysteresis_ros/hysteresis demo $(DEMO_ARGS)
 
 test: build
 	@$(IN_WORKSPACE) COVERAGE_CORE=sysmon COVERAGE_FILE=$(WORKSPACE)/build/coverage \
@@ -119,6 +124,15 @@ pictures: build
 firmware:
 	@$(MAKE) -s -C firmware all
 	@echo 'firmware/build/firmware.hex'
+
+fuzz: $(VENV)/made
+	@$(MAKE) -s -C firmware fuzz $(FUZZ_ARGS)
+	@$(VENV)/bin/python tools/fuzz_decoder.py -runs=100000 -max_len=512 -verbosity=0 \
+		-artifact_prefix=$(WORKSPACE)/build/
+
+# The times in docs/safety.md; a machine that does something else makes them longer.
+faults: build
+	@$(IN_WORKSPACE) $(VENV)/bin/python tools/faults.py docs/safety.md
 
 clean:
 	rm -rf firmware/build .venv* .workspace* build install log dist demo *.egg-info

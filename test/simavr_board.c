@@ -4,10 +4,11 @@
 // The firmware's machine code in simavr: its serial port is a pseudo-terminal, its encoder, supply
 // and stop input do what standard input says, and standard output tells what its gates get.
 //
-//   simavr_board firmware.elf
+//   simavr_board firmware.elf [SPEED]
 //
-// It begins with the line `port NAME`. Time passes no faster than the wall's. Commands, one a line,
-// each answered by one line:
+// It begins with the line `port NAME`. Time passes no faster than SPEED times the wall's; one that
+// is given is stated in the chip's greeting, as by the simulated board. Commands, one a line, each
+// answered by one line:
 //
 //   turn EDGES RATE     move the encoder at so many edges a second; EDGES may be negative
 //   supply MILLIVOLTS   of the muscle's supply
@@ -57,6 +58,8 @@ enum { TRACK_A = 2, TRACK_B = 3, INDEX_PIN = 4, STOP_PIN = 7 };
 static avr_t *avr;
 static avr_irq_t *port_d[8];
 static int terminal;
+static double speed = 1.0;
+static bool states_speed;
 
 static unsigned char queue[QUEUE];
 static unsigned queue_in, queue_out;
@@ -124,13 +127,52 @@ static avr_cycle_count_t on_byte(avr_t *chip, avr_cycle_count_t when, void *unus
     return when + BYTE_CYCLES;
 }
 
+static void send(const char *data, size_t length)
+{
+    if (write(terminal, data, length) != (ssize_t)length) {
+        return;         // nobody reads: a real line loses it, too
+    }
+}
+
+// The greeting, with the speed in it and another CRC.
+static void send_greeting(char *line, size_t length)
+{
+    char *const end = memrchr(line, '*', length);
+    if (!end) {
+        send(line, length);
+        return;
+    }
+    length = (end - line) + sprintf(end, " speed=%.5f", speed);
+    unsigned crc = 0xFFFF;
+    for (size_t i = 0; i < length; i++) {
+        crc ^= (unsigned)(unsigned char)line[i] << 8;
+        for (int bit = 0; bit < 8; bit++) {
+            crc = (crc & 0x8000 ? crc << 1 ^ 0x1021 : crc << 1) & 0xFFFF;
+        }
+    }
+    length += sprintf(line + length, "*%04X\n", crc);
+    send(line, length);
+}
+
 static void on_sent(avr_irq_t *irq, uint32_t value, void *unused)
 {
     (void)irq;
     (void)unused;
-    const unsigned char byte = value;
-    if (write(terminal, &byte, 1) != 1) {
-        return;         // nobody reads: a real line loses it, too
+    static char line[512];
+    static size_t length;
+    const char byte = value;
+    if (!states_speed) {
+        send(&byte, 1);
+        return;
+    }
+    line[length++] = byte;
+    if (byte == '\n' || length == sizeof line / 2) {
+        if (length > 6 && !memcmp(line, "board ", 6)) {
+            send_greeting(line, length);
+        } else {
+            send(line, length);
+        }
+        length = 0;
     }
 }
 
@@ -382,8 +424,12 @@ static void connect_chip(void)
 
 int main(int count, char **arguments)
 {
-    if (count != 2) {
-        fprintf(stderr, "usage: simavr_board firmware.elf\n");
+    if (count == 3) {
+        speed = atof(arguments[2]);
+        states_speed = true;
+    }
+    if (count < 2 || count > 3 || !(speed > 0.0)) {
+        fprintf(stderr, "usage: simavr_board firmware.elf [SPEED]\n");
         return 2;
     }
     setvbuf(stdout, NULL, _IOLBF, 0);
@@ -399,7 +445,7 @@ int main(int count, char **arguments)
             return 1;
         }
         wall = wall_clock() - start;
-        const double ahead = milliseconds() - wall;
+        const double ahead = milliseconds() / speed - wall;
         if (ahead > 1.0) {
             usleep((useconds_t)(1000.0 * ahead));
         }

@@ -16,7 +16,11 @@ from firmware_support import FIRMWARE, make, PWM_STEPS
 from hysteresis_ros.bridge.board import Board
 from hysteresis_ros.bridge.board_link import Timeouts
 from hysteresis_ros.bridge.encoder import AMT103_COUNTS, Encoder
+from hysteresis_ros.bridge.protection import Limits, Protection
+from hysteresis_ros.bridge.protocol import encode
 from hysteresis_ros.bridge.pwm import Pwm
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory.plant import Plant
 import pytest
 
 DEADLINE = 20.0             # s of the wall, for what the board does by its own clock
@@ -32,7 +36,7 @@ pytestmark = pytest.mark.skipif(
     bool(MISSING), reason=f'sudo apt install {" ".join(MISSING)} runs the firmware in simavr')
 
 # By the wall's clock, which a busy machine lets run far ahead of the simulated chip's.
-PATIENT = Timeouts(setpoint=60.0, telemetry=10.0, greeting=10.0)
+PATIENT = Timeouts(setpoint=60.0, telemetry=10.0, late=10.0, greeting=10.0)
 
 # A host that heats until it is killed.
 HOST = """
@@ -134,7 +138,8 @@ def host(machine):
 
 def host_of(machine):
     return Board(machine.port, pwm=Pwm('mean', maximum_voltage=12.0), timeouts=PATIENT,
-                 encoder=Encoder(maximum_speed=200.0, index='check'))
+                 encoder=Encoder(maximum_speed=200.0, index='check'),
+                 protection=Protection(Limits(maximum_voltage=12.0, encoder_check=False)))
 
 
 def drive(host, machine, steps):
@@ -199,7 +204,7 @@ def test_a_host_that_dies_while_hot_leaves_the_muscle_off(machine, silence):
 
 
 def test_a_loop_that_hangs_starts_the_chip_anew(host, machine):
-    """The chip's own watchdog; the host greets again and asks for nothing until it is told."""
+    """The chip's own watchdog; the host greets again and enables nothing until it is told."""
     drive(host, machine, 700)
     since = machine.state['ms']
     machine.tell('hang')
@@ -208,8 +213,7 @@ def test_a_loop_that_hangs_starts_the_chip_anew(host, machine):
     boot = host.status.identity.boot
     until(lambda: host.status.connections == 2, 'the second greeting')
     assert host.status.identity.boot == boot + 1
-    until(lambda: host.status.sample.enabled, 'enabling')
-    assert machine.pwm == [0, 0, 0]
+    assert machine.pwm == [0, 0, 0] and not host.wanted
     until(lambda: 'started anew' in host.status.sample.encoder_fault, 'the fault of the angle')
 
 
@@ -260,3 +264,51 @@ def test_the_stack_is_no_deeper_than_was_computed(programs, host, machine):
     os.write(host._link._serial.fileno(), b'config 1 period=x\n\xff\xff\n' * 10)
     until(lambda: machine.state['edges_left'] == 0, 'the encoder')
     assert 40 < machine.state['stack'] <= stack + interrupt
+
+
+def test_the_port_avr_is_the_chip_with_an_arm_on_it(programs, monkeypatch):
+    """Heated through machine code, the arm lifts; the greeting states the speed."""
+    monkeypatch.setenv('HYSTERESIS_ROS_AVR', str(programs[1].parent))
+    zero = Plant(2).arm.angle
+    with Board('avr://bicep?speed=0.5&seed=2', timeouts=PATIENT,
+               encoder=Encoder(zero=zero)) as host:
+        until(lambda: host.status.online, 'the board')
+        chip = host._link._serial.chip
+        try:
+            assert host.speed == 0.5 and host.status.identity.name == 'atmega328p'
+            host.enable(True)
+            until(lambda: host.status.sample.enabled, 'enabling')
+            host.set_voltage(6.0)
+            until(lambda: host.status.sample.voltage == pytest.approx(6.0, abs=0.05), 'the voltage')
+            until(lambda: host.status.sample.angle < zero - 0.1, 'the arm')
+            host.set_zero()
+            assert chip.arm.angle < zero - 0.1 and not host.status.fault
+            assert host.status.sample.angle == pytest.approx(chip.arm.angle, abs=0.1)
+        finally:
+            chip.close()
+
+
+def test_the_port_avr_says_what_it_needs(monkeypatch):
+    """In one line, in the place of a port that cannot be opened."""
+    monkeypatch.setenv('HYSTERESIS_ROS_AVR', '/nowhere')
+    with Board('avr://bicep') as host:
+        until(lambda: "make demo DEMO_ARGS='--port avr://'" in host.status.problem, 'the reason')
+    with pytest.raises(ParameterError, match='avr:// takes speed'):
+        Board('avr://bicep?drop=0.1')
+
+
+def test_a_reset_in_the_middle_of_a_frame_obeys_neither_half(machine):
+    """A brown-out in a frame: what is left of the line after it is not one."""
+    with host_of(machine) as host:
+        until(lambda: host.status.online, 'the board')
+        drive(host, machine, 300)
+        host._link._write = lambda data: None
+        line = encode('set', 7, {'duty': 0.9})
+        os.write(host._link._serial.fileno(), line[:9])
+        until(lambda: machine.state['waiting'] == 0, 'the first half')
+        since = machine.state['ms']
+        machine.tell('reset')
+        os.write(host._link._serial.fileno(), line[9:])
+        assert machine.zero_after(since) < 50.0
+        time.sleep(0.5)
+        assert machine.pwm == [0, 0, 0]

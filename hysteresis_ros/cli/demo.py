@@ -35,6 +35,10 @@ ENTRIES = ('bench', 'model.yaml', 'run', 'run.log', 'extended.yaml', 'run_extend
 # which the arm's time may not run much faster than the nodes can follow.
 SETTLED_HOLD = 30.0
 PASSING_HOLD, PASSING_SPEED = 6.0, 12.0
+# The arm's time against the wall clock's, and the port with the firmware in simavr.
+SIMULATED_SPEED, AVR_SPEED = 60.0, 0.4
+AVR = 'avr://'
+LATEST_ANGLE = 5.0      # s; --hidden latency makes them late
 
 
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
@@ -49,8 +53,11 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     parser.add_argument('-o', '--output', type=OutputFolder, default='demo', metavar='DIR',
                         help='folder for everything that is written (default: demo)')
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='of arm and sequences')
-    parser.add_argument('--speed', type=float, default=60.0, metavar='X',
+    parser.add_argument('--speed', type=float, metavar='X',
                         help="the arm's time against the wall clock's (default: 60)")
+    parser.add_argument('--port', metavar='PORT',
+                        help='avr://, the firmware for the board in simavr, at --speed 0.4 unless '
+                        'another is given, so choose few --values; default: the simulated board')
     parser.add_argument('--values', type=int, default=VALUES, metavar='N',
                         help='targets in each sequence (default: 40)')
     parser.add_argument('--effects', choices=('none', 'auto'), default='none',
@@ -105,6 +112,13 @@ def run(args: argparse.Namespace) -> None:
     from hysteresis_ros.comparison.compare import compare
     from hysteresis_ros.measurements import read_measurement
 
+    if args.port not in (None, AVR):
+        raise ParameterError(f'--port {args.port}: the demo knows {AVR}, and the simulated board '
+                             'without --port')
+    if args.speed is None:
+        args.speed = AVR_SPEED if args.port else SIMULATED_SPEED
+    if args.port and (args.hidden or args.speed > 1.2):
+        raise ParameterError(f'--port {AVR}: without --hidden, and no faster than --speed 1.2')
     if args.values < 4:
         raise ParameterError('--values must be at least 4')
     if not 0.1 <= args.speed <= 200.0:
@@ -206,11 +220,19 @@ def drive(args: argparse.Namespace, folder: Path, sequences: Angles, model_file:
     port = f'sim://bicep?speed={pace.speed:g}&seed={args.seed}'
     if hidden:
         port += f'&{hidden}={args.strength:g}'
+    own: dict[str, Any] = {}
+    if args.port:
+        from hysteresis_ros.laboratory.plant import Plant
+
+        port = f'{AVR}bicep?speed={pace.speed:g}&seed={args.seed}'
+        # The chip counts from where the arm is when it is switched on.
+        own = {'encoder_zero': float(Plant(args.seed).arm.angle)}
     parameters = {
         'port': port, 'model_file': str(Path(model_file).resolve()), 'use_sim_time': True,
         'telemetry_rate': 2.0, 'horizon': min(5.0, 0.7 * pace.hold),
         'republish_period': min(5.0, pace.hold / 6.0), 'setpoint_timeout': 60.0,
-        'telemetry_timeout': 30.0, 'board_watchdog': 30.0}
+        'telemetry_timeout': 30.0, 'board_watchdog': 30.0, 'angle_latency': LATEST_ANGLE,
+        **own}
     steps = iter(progress(range(len(sequences) * args.values), 'driving',
                           len(sequences) * args.values))
     reached = record(folder, list(sequences.values()), parameters, pace.hold,
