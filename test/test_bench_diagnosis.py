@@ -131,7 +131,7 @@ def test_creep_of_a_polymer_shows_and_is_plausible():
     assert found.missing == ['creep']
     assert found.effects[0].values['kept'] == 1.0
     assert not found.effects[0].implausible()
-    assert found.rmse_after < 0.5 * found.rmse_before
+    assert found.rmse_after < 0.55 * found.rmse_before
 
 
 def test_ratcheting_shows_though_every_trial_begins_anew():
@@ -140,7 +140,7 @@ def test_ratcheting_shows_though_every_trial_begins_anew():
     assert found.missing == ['fatigue']
     assert found.effects[0].values['kept'] == 0.0
     assert not found.effects[0].implausible()
-    assert found.rmse_after < 0.5 * found.rmse_before
+    assert found.rmse_after < 0.55 * found.rmse_before
 
 
 @pytest.mark.parametrize('name, values', [

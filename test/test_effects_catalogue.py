@@ -38,6 +38,8 @@ EXPECTED = {
     'fatigue': ('material', 'cycle count', 'reference loop', {'ambient_drift'}),
     'slack': ('material', 'low force', 'preload', {'r_phase', 'geometry_error'}),
     'series_compliance': ('material', 'force', 'weights', {'payload_error', 'geometry_error'}),
+    'transformation_slopes': ('material', "loop's width", 'three or more loads',
+                              {'stress_dependence', 'r_phase'}),
     'unequal_muscles': ('material', 'smeared knees', 'one muscle at a time',
                         {'slack', 'geometry_error'}),
     'coulomb_friction': ('mechanism', 'reversals', 'tap', {'backlash'}),

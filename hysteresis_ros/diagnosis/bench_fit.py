@@ -27,6 +27,9 @@ FOLLOWED_STARTS, WORTH_FOLLOWING, FIRST_EVALUATIONS = 2, 2.0, 4
 SAME = 9
 MOST_EVALUATIONS, HELD_OUT_EVALUATIONS = 8, 3
 TOLERANCE = 1e-3
+# A parameter whose whole unit moves the response by less than this share of its spread (rms), once
+# the weights have followed, is not determined.
+UNDETERMINED = 1e-5
 
 
 class Response:
@@ -201,7 +204,13 @@ class BenchFitter:
             return fit.effects
         jacobian = fit.jacobian
         error = self.problem.measured - fit.predicted
-        inverse = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-10)
+        size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+        normal = (jacobian / size).T @ (jacobian / size)
+        inverse = np.linalg.pinv(normal, rcond=1e-10)
+        # What the rows do not determine at all has no end, instead of no width.
+        free = 1.0 - np.diag(inverse @ normal) > 0.5
+        free |= size <= UNDETERMINED * float(np.std(self.problem.measured)) * np.sqrt(len(error))
+        inverse = inverse / np.outer(size, size)
         scores = np.stack([jacobian[rows].T @ error[rows] for rows in (
             self.problem.block == block for block in np.unique(self.problem.block))])
         count = len(scores)
@@ -209,4 +218,5 @@ class BenchFitter:
         covariance = count / freedom * inverse @ (scores.T @ scores) @ inverse
         half = special.stdtrit(freedom, 0.5 + level / 2.0) * np.sqrt(
             np.maximum(np.diag(covariance), 0.0))
+        half[free] = np.inf
         return parameters.with_intervals(fit.vector, half)

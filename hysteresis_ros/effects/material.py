@@ -7,15 +7,20 @@ Those of the load (`stress_dependence`, `stress_dependent_strain`, `series_compl
 what a bench measures, so adding them on bench tables refits the weights of H2.
 """
 
+import dataclasses
 import math
 from typing import ClassVar
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.base import Effect, Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.kernels.creep import fade, relax
 from hysteresis_ros.kernels.play import follow
+
+
+# Drives that make a muscle hot.
+HEATING = ('voltage', 'current', 'power', 'temperature')
 
 
 class StressDependence(MaterialEffect):
@@ -175,6 +180,11 @@ class RPhase(MaterialEffect):
                   0.03, (0.03,), log=True),)
 
     memory = ('_played',)
+
+    @classmethod
+    def available(cls, surroundings: Surroundings) -> bool:
+        """Whether the drive heats: pressure transforms nothing."""
+        return surroundings.drive in HEATING
 
     # Width w of the step's own hysteresis over the largest drive squared.
     LOOP = 0.03
@@ -368,6 +378,19 @@ class Fatigue(MaterialEffect):
         """Return the same for a whole trial at once."""
         begun = 0.0 if self.kept else inputs.cycles[0]
         return self._worn(inputs.cycles - begun, surroundings)
+
+    def within_trials(self) -> Effect:
+        """
+        Return the effect with every trial beginning anew.
+
+        Where each load has one trial, what use would carry over cannot be told from the load.
+        """
+        kept = next(parameter for parameter in self.parameters if parameter.name == 'kept')
+        other = self.with_values(kept=0.0)
+        other.parameters = tuple(
+            dataclasses.replace(parameter, choices=(0.0,)) if parameter is kept else parameter
+            for parameter in self.parameters)
+        return other
 
     def _worn(self, cycles: Values, surroundings: Surroundings) -> tuple[Values, Values]:
         logarithm = np.log1p(cycles)

@@ -82,6 +82,15 @@ def mean_output(wires: Wires, memories: np.ndarray) -> float:
 
 
 @lean
+def mean_offset(wires: Wires) -> float:
+    """Return the mean of the excess lengths [m]."""
+    total = 0.0
+    for i in range(len(wires.offsets)):
+        total += wires.offsets[i]
+    return total / len(wires.offsets)
+
+
+@lean
 def commit(wires: Wires, memories: np.ndarray, inputs: np.ndarray) -> None:
     """Commit each muscle's input."""
     for i in range(len(wires.offsets)):

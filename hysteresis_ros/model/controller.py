@@ -17,7 +17,7 @@ from hysteresis_ros.effects.thermal import FirstOrderLag, LatentHeat
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.pacing import Pacing
-from hysteresis_ros.model.second_stage import SecondStage
+from hysteresis_ros.model.second_stage import Load, SecondStage
 from hysteresis_ros.model.targets import Targets
 
 if TYPE_CHECKING:
@@ -365,7 +365,7 @@ class Controller:
     def _setpoint(self, length: float, force: float, time: float | None, ambient: float
                   ) -> Setpoint:
         self._pacing.advance(time)
-        load = float(self._chain.load_inside(np.float64(force))) if self._first.loaded else 0.0
+        load = self._felt(force)
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
             self._second.settle_cold(self._cold, load, self._at_rest()[1] if self._arm else None)
@@ -389,6 +389,13 @@ class Controller:
                       f'{limits} {self.model.drive}; expected {1e3 * outcome.length:.3f} mm')
         return Setpoint(applied, saturated, outcome.length, outcome.length - length, reason)
 
+    def _felt(self, force: float) -> Load:
+        """Return a load [N] as the transformation feels it."""
+        if not self._first.loaded:
+            return Load(0.0)
+        load = np.float64(force)
+        return Load(float(self._chain.load_inside(load)), float(self._chain.loop_width(load)))
+
     def _transformed(self, length: float, force: float) -> float:
         """Return what the transformation has to give for a length [m] under a force [N]."""
         base = self._second.base
@@ -399,7 +406,7 @@ class Controller:
         """Return the share of martensite at a length [m] under a force [N]."""
         return float(self.model.martensite(self._transformed(length, force)))
 
-    def _invert(self, length: float, force: float, load: float, inputs: Inputs
+    def _invert(self, length: float, force: float, load: Load, inputs: Inputs
                 ) -> tuple[float, bool]:
         """Drive in closed form, and whether it is out of reach."""
         x, out_of_reach = self._second.drive(
@@ -408,7 +415,7 @@ class Controller:
         drive, clipped = self._clip(self._steady.inverse(drive_squared, inputs))
         return drive, out_of_reach or saturated or clipped
 
-    def _search(self, length: float, force: float, load: float, inputs: Inputs
+    def _search(self, length: float, force: float, load: Load, inputs: Inputs
                 ) -> tuple[float, bool]:
         """Drive by a search: the offset of time and use depends on the drive that is sought."""
         low, high = self.limits
@@ -431,7 +438,7 @@ class Controller:
         from scipy.optimize import brentq   # half a second that most models do not need
         return brentq(error, low, high, xtol=1e-14, rtol=1e-14), False
 
-    def _outcome(self, drive: float, force: float, load: float, inputs: Inputs) -> Outcome:
+    def _outcome(self, drive: float, force: float, load: Load, inputs: Inputs) -> Outcome:
         """Say what a drive would do; commits nothing."""
         drive_squared = self._steady.step(drive, inputs)
         output, committed = self._second.respond(self._first.peek(drive_squared), load)

@@ -4,18 +4,33 @@
 
 from collections.abc import Mapping, Sequence
 import copy
-from typing import Any
+from typing import Any, NamedTuple
 
 from hysteresis_ros.bicep.bundle import Bundle
+from hysteresis_ros.kernels.load_play import held
 from hysteresis_ros.operators import HysteresisOperator
 
 # Elongation [m] by which elastic wires may leave the range of the transformation.
 ELASTIC_ROOM = 0.02
 
 
+class Load(NamedTuple):
+    """
+    A load as the transformation feels it.
+
+    `inside` is what the drive is weighed against, and `width` by how much the loop is wider under
+    it than that of H2, both in the unit of the load.
+    """
+
+    inside: float
+    width: float = 0.0
+
+
 class SecondStage:
     """
     H2 with its memory: ``output = H2[sign (x - load)]``, and the inverse for x (Eq. 13).
+
+    Where the load widens the loop, the input of H2 is that of `kernels.load_play`.
 
     Parameters
     ----------
@@ -58,14 +73,16 @@ class SecondStage:
         for operator, entry in zip(self._operators, state, strict=True):
             operator.restore(entry)
 
-    def settle_cold(self, x: float, load: float, inputs: Sequence[float] | None = None) -> None:
+    def settle_cold(self, x: float, load: Load, inputs: Sequence[float] | None = None) -> None:
         """
         Start from the cold state.
 
         Parameters
         ----------
-        x, load : float
-            Output of the first stage, and load that is borne, both cold.
+        x : float
+            Output of the first stage, cold.
+        load : Load
+            That is borne meanwhile.
         inputs : sequence of float, optional
             What each muscle starts from, where that is known better.
         """
@@ -78,20 +95,31 @@ class SecondStage:
         outputs = [operator.output for operator in self._operators]
         return sum(outputs) / len(outputs)
 
-    def drive(self, output: float, load: float, dead_band: float = 0.0) -> tuple[float, bool]:
+    def drive(self, output: float, load: Load, dead_band: float = 0.0) -> tuple[float, bool]:
         """Return x for an output [m] under a load, and whether that output is out of reach."""
         if self._bundle is not None:
-            return self._bundle.drive(output, load), False
-        found = self._operators[0].invert(output, dead_band=dead_band)
-        return self._sign * found.input + load, found.saturated
+            cooling = output > self.output
+            return self._bundle.drive(output, load.inside - cooling * load.width), False
+        operator = self._operators[0]
+        found = operator.invert(output, dead_band=dead_band)
+        play = load.width if found.input > operator.input else 0.0
+        return self._sign * found.input + load.inside - play, found.saturated
 
-    def respond(self, x: float, load: float) -> tuple[float, list[float]]:
+    def respond(self, x: float, load: Load) -> tuple[float, list[float]]:
         """Return the output [m] and the inputs that `step` would commit."""
         if self._bundle is None:
-            u = self._sign * (x - load)
+            u = self._sign * (x - load.inside)
+            if load.width > 0.0:
+                u = held(self._operators[0].input, u, load.width)
             return self._operators[0].peek(u), [u]
-        return self._bundle.respond(
-            x, load, self.base - self._room, self._top + self._room, self.base)
+        limits = self.base - self._room, self._top + self._room, self.base
+        heated = self._bundle.respond(x, load.inside, *limits)
+        if load.width == 0.0 or heated[0] <= self.output:
+            return heated
+        cooled = self._bundle.respond(x, load.inside - load.width, *limits)
+        if cooled[0] >= self.output:
+            return cooled
+        return self.output, [operator.input for operator in self._operators]
 
     def step(self, inputs: Sequence[float]) -> None:
         """Commit each muscle's input."""
