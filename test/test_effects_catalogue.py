@@ -59,7 +59,7 @@ EXPECTED = {
 # Effect, parameter: unit and plausible range for a 0.2 mm wire on this arm.
 RANGES = {
     ('supply_sag', 'Rs'): ('Ohm', 0.05, 2.0), ('pwm_dead_zone', 'Vd'): ('V', 0.05, 1.5),
-    ('thermal_lag', 'time_constant'): ('s', 1.0, 10.0),
+    ('thermal_lag', 'time_constant'): ('s', 0.05, 100.0),
     ('heating_cooling_asymmetry', 'ratio'): ('1', 0.5, 2.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
     ('creep', 'c'): ('% of l0', 0.01, 0.5), ('slack', 'Ls'): ('mm', 0.1, 5.0),
     ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),

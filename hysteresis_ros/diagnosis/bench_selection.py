@@ -19,6 +19,7 @@ import numpy as np
 from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.extend import undetermined
 from hysteresis_ros.diagnosis.observable import observable, present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.effects import catalogue, Effect
@@ -105,6 +106,7 @@ class BenchSelection:
         self.found = min(near_best, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.error(fit)))
         self._keep_stable()
+        self._keep_determined()
 
     def _grown(self) -> list[Fit]:
         """
@@ -139,15 +141,31 @@ class BenchSelection:
         better than the best set without it, where both were fitted to the other loads.
         """
         while self.found.effects:
-            without = {name: min((fit for fit in [self.base, *self.sets] if name not in fit.names),
-                                 key=self.error) for name in self.found.names}
+            without = {name: self._best_without(name) for name in self.found.names}
             share = {name: self._named_again(other) for name, other in without.items()}
             name = min(share, key=lambda one: share[one])
             if share[name] > NAMED_AGAIN:
                 return
-            self.unstable[name] = (f'with a load left out it is named again on '
-                                   f'{100.0 * share[name]:.0f} % of them')
-            self.found = without[name]
+            self._leave_out(name, f'with one load left out it is named again on '
+                            f'{100.0 * share[name]:.0f} % of them', without[name])
+
+    def _keep_determined(self) -> None:
+        """Leave out effects whose size the rows do not determine, but for what is usual."""
+        for effect in self.fitter.with_intervals(self.found):
+            size = f'{effect.id}.{effect.parameters[0].name} '
+            notes = [note for note in undetermined(effect, self.problem.kind) if size in note]
+            if notes and not effect.universal and effect.id in self.found.names:
+                self._leave_out(effect.id, notes[0], self._best_without(effect.id))
+
+    def _leave_out(self, name: str, reason: str, instead: Fit) -> None:
+        experiment = catalogue()[name].experiment
+        self.unstable[name] = f'cannot be determined here: {reason}; it would be by: {experiment}'
+        self.found = instead
+
+    def _best_without(self, name: str) -> Fit:
+        """Return the best set that lacks an effect."""
+        return min((fit for fit in [self.base, *self.sets] if name not in fit.names),
+                   key=self.error)
 
     def _named_again(self, other: Fit) -> float:
         """Return the share of folds that the set found predicts better than another one."""

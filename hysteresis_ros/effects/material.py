@@ -339,9 +339,11 @@ class Fatigue(MaterialEffect):
     """Cycle after cycle the muscle gets shorter, or longer, and loses stroke."""
 
     id = 'fatigue'
-    sentence = 'With every cycle the muscle gets a little shorter, or longer, and loses stroke.'
-    equation = 'L -= b l0 ln(1 + N), stroke times (1 - a ln(1 + N)), N the number of cycles'
-    source = 'functional fatigue of shape memory alloys'
+    sentence = ('With every cycle the muscle gets a little shorter (b > 0) or longer (b < 0), and '
+                'loses stroke.')
+    equation = ('L -= b l0 w, stroke times (1 - a w), w = ln(1 + N / N0), N the cycles of the '
+                'recording: ln(1 + (N + Nb) / N1) against its start, N0 = N1 + Nb')
+    source = 'functional fatigue and training of shape memory alloys'
     shows_in = 'cycle count'
     experiment = 'repeat a reference loop and compare the first with the last'
     confused_with = ('ambient_drift',)
@@ -352,6 +354,9 @@ class Fatigue(MaterialEffect):
                   (0.05, -0.05), both_signs=True),
         Parameter('a', '1', 'loss of stroke per factor e of the number of cycles', 0.0, 0.3, 0.0,
                   (0.03,)),
+        Parameter('N0', '1', 'cycles before the recording, and those of the first wear: an old '
+                  'muscle wears more slowly than a new one', 1.0, 1e5, 1.0, (1.0,), log=True,
+                  limits=(1.0, 1e5), kinds=()),
         Parameter('kept', '1', '1: what earlier trials have worn stays; 0: every trial begins '
                   'anew, as with another specimen or one that recovers', 0.0, 1.0, 1.0, (1.0, 0.0),
                   choices=(1.0, 0.0), kinds=('bench',)))
@@ -393,7 +398,7 @@ class Fatigue(MaterialEffect):
         return other
 
     def _worn(self, cycles: Values, surroundings: Surroundings) -> tuple[Values, Values]:
-        logarithm = np.log1p(cycles)
+        logarithm = np.log1p(cycles / self.N0)
         offset = -self.b / 100.0 * surroundings.length * logarithm
         return offset, np.maximum(1.0 - self.a * logarithm, 0.1)
 
