@@ -184,10 +184,10 @@ class BenchFitter:
 
     def cross_validate(self, fit: Fit) -> Fit:
         """Return a fit with the response of every row as predicted by a fit to the other folds."""
-        held_out = np.empty(len(self.problem.measured))
-        for fold in self.problem.folds:
-            test = self.problem.fold == fold
-            response = Response(self.problem, self.fixed, fit.effects, ~test)
+        problem, held_out = self.problem.holding_out(), np.empty(len(self.problem.measured))
+        for fold in problem.folds:
+            test = problem.fold == fold
+            response = Response(problem, self.fixed, fit.effects, ~test)
             vector = response.minimise(fit.vector, HELD_OUT_EVALUATIONS, TOLERANCE)
             held_out[test] = response.predicted(vector)[test]
         return dataclasses.replace(fit, held_out=held_out)
