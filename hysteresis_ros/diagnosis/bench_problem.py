@@ -41,8 +41,8 @@ Entry = TypeVar('Entry')
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
 # the solution is unique. More of it bends the effects' own parameters.
 SEARCH_STRENGTH = 3e-9
-# The same for weights that predict rows held out: more of it widens a steep loop, which under a load
-# that was not fitted counts as the error of the effects.
+# The same for weights that predict rows held out: more of it widens a steep loop, which under a
+# load that was not fitted counts as the error of the effects.
 HELD_OUT_STRENGTH = 1e-9
 # Courses that are remembered, those of the latest effects.
 MOST_COURSES = 20
