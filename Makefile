@@ -19,12 +19,12 @@ endif
 ROS := $(if $(filter jazzy,$(ROS_DISTRO)),$(shell \
 	env -u _ROS_WHEELS_BOOTSTRAP_COMPLETE $(PYTHON) -c 'import rclpy; print("sourced")' 2>/dev/null))
 ifeq ($(ROS),sourced)
-EXTRAS := test,docs,bags
+EXTRAS := test,docs,bags,studio
 else
 ifeq ($(ROS_DISTRO),jazzy)
 $(info ROS 2 Jazzy is sourced, but $(PYTHON) cannot import rclpy: its wheels are used.)
 endif
-EXTRAS := test,docs,bags,ros
+EXTRAS := test,docs,bags,studio,ros
 unexport PYTHONPATH AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH
 endif
 

@@ -122,7 +122,8 @@ setup(
     keywords=['ROS', 'hysteresis', 'Preisach', 'artificial muscle', 'shape memory alloy'],
     packages=find_packages(include=[PACKAGE, PACKAGE + '.*']),
     # The first tells type checkers that our annotations are meant for them.
-    package_data={PACKAGE: ['py.typed', 'report/web/*.css', 'report/web/*.js']},
+    package_data={PACKAGE: ['py.typed', 'report/web/*.css', 'report/web/*.js',
+                            'studio/web/*.css']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + PACKAGE]),
         ('share/' + PACKAGE, ['package.xml']),
@@ -151,10 +152,14 @@ setup(
         # Builds docs/ as HTML: numpydoc reads the docstrings, MyST the pages in Markdown. The
         # lower bounds are what Ubuntu 24.04 ships.
         'docs': ['sphinx>=7.2', 'numpydoc>=1.6', 'myst-parser>=2.0'],
+        # The page of `hysteresis studio`. With what it brings 104 MB, Dash 136, Panel 296; it holds
+        # all that its pages load, and speaks to them over a socket as a slider moves.
+        'studio': ['nicegui>=3.0,<4', 'starlette'],
         # Spreads a diagnosis over a laboratory's machines.
         'cluster': ['dask[distributed]>=2024.1'],
         # ROS 2 Jazzy as wheels, for a machine that has no ROS.
-        'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces'],
+        'ros': ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces',
+                'ros-jazzy-lifecycle-msgs'],
         'test': [
             # launch_testing's plug-in, which ROS installs, breaks with pytest 9.
             'pytest>=7.4,<9',

@@ -24,8 +24,8 @@ exclude_patterns = ['_build']
 # The pages need neither ROS nor a serial port.
 autodoc_mock_imports = [
     'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
-    'rcl_interfaces', 'rclpy', 'rosbag2_py', 'rosgraph_msgs', 'sensor_msgs', 'serial', 'std_msgs',
-    'std_srvs', 'trajectory_msgs', 'visualization_msgs']
+    'nicegui', 'rcl_interfaces', 'rclpy', 'rosbag2_py', 'rosgraph_msgs', 'sensor_msgs', 'serial',
+    'starlette', 'std_msgs', 'std_srvs', 'trajectory_msgs', 'visualization_msgs']
 autodoc_member_order = 'bysource'
 autodoc_typehints = 'none'      # the docstrings give the types
 numpydoc_class_members_toctree = False

@@ -33,6 +33,8 @@ ARGUMENTS = {
     'namespace': ('', 'Namespace of all nodes and topics'),
     'feedback': ('', 'true: the measured angle corrects the setpoint slowly; empty: as in '
                  'params_file'),
+    'autostart': ('', 'false: bridge and compensator wait for `ros2 lifecycle set`; empty: as in '
+                  'params_file'),
     'monitor': ('true', 'Whether the model runs along and its residual is published'),
     'use_sim_time': ('', 'Whether all nodes follow /clock; empty: if the port is a simulated '
                      'board that does not live at real time'),
@@ -57,7 +59,7 @@ def start(context, *_) -> list:
     given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     overrides = {name: given[name] for name in ('port', 'model_file') if given[name]}
     overrides.update({name: is_true(name, given[name])
-                      for name in ('feedback', 'use_sim_time') if given[name]})
+                      for name in ('feedback', 'autostart', 'use_sim_time') if given[name]})
     if not given['use_sim_time'] and has_own_time(given['port'] or port_in(given['params_file'])):
         overrides['use_sim_time'] = True
 

@@ -87,10 +87,10 @@ class Browser:
         return json.loads(message)
 
     def open(self, path, width, height=900):
-        """Show a file in a window of a size, px."""
+        """Show a file, or what an address (str) leads to, in a window of a size, px."""
         self.events.clear()
         self.size(width, height)
-        self.call('Page.navigate', url=path.as_uri())
+        self.call('Page.navigate', url=path if isinstance(path, str) else path.as_uri())
         while self.run('document.readyState') != 'complete' or self.run('location.href') in (
                 'about:blank', ''):
             time.sleep(0.02)

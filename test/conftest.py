@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Whole diagnoses and whole sessions, by file: marked as slow, as single tests may be, too.
 SLOW = ('test_bench_diagnosis', 'test_demo', 'test_diagnose', 'test_firmware_machine_code',
-        'test_kernel_cache', 'test_loads', 'test_page_in_browser', 'test_readme', 'test_table1')
+        'test_kernel_cache', 'test_loads', 'test_page_in_browser', 'test_readme',
+        'test_studio_in_browser', 'test_table1')
 
 # Tests of other runs on the same network must not be heard; rclpy reads this at its start.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')

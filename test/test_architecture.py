@@ -11,10 +11,13 @@ import sys
 import pytest
 
 ROS = {'rclpy', 'ament_index_python', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
-       'rcl_interfaces', 'rosbag2_py', 'rosgraph_msgs', 'rosidl_runtime_py', 'sensor_msgs',
-       'std_msgs', 'std_srvs', 'trajectory_msgs', 'visualization_msgs'}
+       'lifecycle_msgs', 'rcl_interfaces', 'rosbag2_py', 'rosgraph_msgs', 'rosidl_runtime_py',
+       'sensor_msgs', 'std_msgs', 'std_srvs', 'trajectory_msgs', 'visualization_msgs'}
 # rosbag2_py reads what rosbags does not know, and is asked for only then.
 ROS_OUTSIDE_NODES = {'hysteresis_ros.measurements.bag_rosbag2'}
+# What serves the page of `hysteresis studio`, and the two files that may know it.
+WEB = {'nicegui', 'fastapi', 'starlette', 'uvicorn'}
+WEB_PAGES = {'hysteresis_ros.studio.page', 'hysteresis_ros.studio.server'}
 MODEL = {'operators', 'effects', 'model', 'identification', 'bicep'}
 # What the simulated board and its host have to agree on: pure functions of bytes.
 CODEC = ('hysteresis_ros.bridge.protocol', 'hysteresis_ros.bridge.messages')
@@ -74,6 +77,20 @@ def test_ros_stays_in_the_nodes(root):
         lambda module: (module.startswith('hysteresis_ros.nodes')
                         or module in ROS_OUTSIDE_NODES),
         lambda name: name.split('.')[0] in ROS) == []
+
+
+def test_the_web_framework_stays_in_the_page(root):
+    """What the page shows and does is tested, and could be shown, without it."""
+    assert offenders(root, lambda module: module in WEB_PAGES,
+                     lambda name: name.split('.')[0] in WEB) == []
+
+
+def test_only_its_command_knows_the_studio(root):
+    """No command needs the page of another one."""
+    assert offenders(
+        root, lambda module: module.startswith(('hysteresis_ros.studio',
+                                                'hysteresis_ros.cli.studio')),
+        lambda name: name.startswith('hysteresis_ros.studio')) == []
 
 
 def test_the_serial_port_stays_in_the_bridge(root):
@@ -143,17 +160,18 @@ def test_plots_cost_nothing_until_drawn(root):
             assert not any(name.split('.')[0] == 'matplotlib' for name in names), module
 
 
-def test_the_core_imports_without_ros_and_serial(root):
-    """Import every module outside nodes and bridge where neither is to be had."""
+def test_the_core_imports_without_ros_serial_and_web(root):
+    """Import every module outside nodes and bridge where none of them is to be had."""
     names = [module for module in modules(root)
              if module.split('.')[1:2] not in (['nodes'], ['bridge'])
-             and module not in ROS_OUTSIDE_NODES and not module.endswith('__main__')]
+             and module not in ROS_OUTSIDE_NODES | {'hysteresis_ros.studio.page'}
+             and not module.endswith('__main__')]
     code = f"""
 import importlib, sys
 
 class Nothing:
     def find_spec(self, name, path=None, target=None):
-        if name.split('.')[0] in {sorted(ROS | {'serial'})!r}:
+        if name.split('.')[0] in {sorted(ROS | WEB | {'serial'})!r}:
             raise ModuleNotFoundError(name)
 
 sys.meta_path.insert(0, Nothing())

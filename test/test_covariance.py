@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from hysteresis_ros.diagnosis.covariance import Covariance, LARGEST_SCALE
+from hysteresis_ros.diagnosis.covariance import Covariance, LARGEST_SCALE, TAILS
 from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 
 ROWS, TRIALS = 120, 3
@@ -63,6 +63,20 @@ def test_the_density_of_a_point_is_that_of_scipy():
     whitened = point.whiten(residual)
     density = point.constant - covariance._prior(point.values)[0] - 0.5 * whitened @ whitened
     assert density == pytest.approx(stats.multivariate_normal(cov=matrix).logpdf(residual))
+
+
+def test_the_density_of_residuals_has_the_tails_of_student():
+    """So that a row that jumps costs a few units, and not half its square."""
+    covariance = make()
+    point = covariance.point(covariance.start(0.4, 0.3))
+    whitened = np.random.default_rng(5).standard_normal((ROWS, 2))
+    whitened[7, 1] += 20.0
+    calm, jump = point.log_density(whitened)
+    # The density of Student's t over its standard units, in place of the Gaussian's.
+    change = stats.t(TAILS).logpdf(whitened) + 0.5 * np.log(2.0 * np.pi)
+    np.testing.assert_allclose((calm, jump), point.constant + np.sum(change, axis=0))
+    assert 5.0 < calm - jump < 20.0
+    assert point.log_density(whitened[:, 0]) == pytest.approx(calm)
 
 
 @pytest.mark.parametrize('noise', [0.003, 0.035])

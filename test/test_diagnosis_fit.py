@@ -165,6 +165,44 @@ def test_a_fit_is_the_maximum_of_the_posterior(loaded):
             assert cost(np.clip(moved, parameters.lower, parameters.upper)) > best
 
 
+def test_a_first_look_carries_derivatives_on_by_secants(loaded, monkeypatch):
+    """It gets nearly as far in three steps, for fewer simulations."""
+    point = loaded.covariance.points[0]
+    start = [neutral(loaded, name) for name in ('payload_error', 'geometry_error')]
+    simulated = []
+
+    def count(sets):
+        simulated[-1] += len(sets)
+        return Fitter.simulate(loaded, sets)
+
+    monkeypatch.setattr(loaded, 'simulate', count)
+    fits = []
+    for how in ({'steps': 0}, {'steps': 3}, {'steps': 3, 'exact': False}):
+        simulated.append(0)
+        fits += loaded.fit([start], point, **how)
+    begun, exact, rough = fits
+    assert simulated[2] < 0.75 * simulated[1]
+    assert rough.log_evidence - begun.log_evidence > 0.9 * (
+        exact.log_evidence - begun.log_evidence) > 0.0
+
+
+def test_a_fit_is_polished_under_the_covariance_that_it_is_judged_by(loaded, monkeypatch):
+    """That of its own way, whose rows may count quite differently."""
+    problem = loaded.problem
+    drive = problem.signals['drive'] / 6.0
+    parts = np.where(drive > 0.5, 10.0, 0.1)[:, None] * SIZE
+    other = Discrepancy(parts, drive[:, None] / 0.45)
+    monkeypatch.setattr(loaded, 'discrepancy', lambda fit: other)
+    start = [[neutral(loaded, 'supply_sag')]]
+    fit, = loaded.fit(start, loaded.covariance.points[0])
+    along = loaded.along(fit)
+    polished = loaded.polished(along)
+    direct = loaded.along(loaded.fit(start, loaded.point(along))[0])
+    assert polished.log_evidence > along.log_evidence + 1.0
+    assert polished.log_evidence == pytest.approx(direct.log_evidence, abs=0.5)
+    assert polished.covariance is along.covariance
+
+
 def test_several_sets_in_one_batch_are_fitted_as_each_by_itself(loaded):
     """All advance together; none knows of the others."""
     sets = [[neutral(loaded, name) for name in names] for names in (

@@ -52,6 +52,21 @@ def test_growth_of_the_stroke_on_the_arm_counts_from_where_the_bench_model_is_ri
     assert np.all(np.diff(more) > 0.0) and np.all((more > 0.0) == (LOADS > there))
 
 
+@pytest.mark.parametrize('values', [{}, {'r': 0.5, 'F0': 1.2}])
+def test_growth_of_the_stroke_on_the_arm_keeps_the_cold_muscle_at_its_resting_length(values):
+    """The resting length is measured cold, whatever the strain of the wire that was mounted."""
+    around = WIRE._replace(rest_load=0.6, least=-0.012)
+    plain, grown = (effect('stress_dependent_strain', around, **values, growth=growth)
+                    for growth in (0.0, 0.3))
+    rest = np.array([0.6])
+    # On the bench's model the elongation of the cold muscle under the load at rest is zero.
+    output = around.least - around.least / plain.scale(rest, around)
+    length = around.least + grown.scale(rest, around) * (output - around.least)
+    np.testing.assert_allclose(length + grown.stretch(rest, around), 0.0, atol=1e-12)
+    assert plain.stretch(LOADS, around).tolist() == [0.0] * 4
+    assert np.ptp(grown.stretch(LOADS, around)) == 0.0 != grown.stretch(0.0, around)
+
+
 @pytest.mark.parametrize('drive, load, unit, low, high, expected', [
     ('voltage', 'force', 'N/V^2', 0.2, 6.0, 2.0), ('current', 'force', 'N/A^2', 1.0, 1e3, 2.0),
     ('temperature', 'stress', 'MPa/K', 5.0, 15.0, 2e6),

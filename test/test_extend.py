@@ -233,3 +233,53 @@ def test_the_recording_is_not_overwritten(base, recordings, tmp_path, capsys):
                  '--data', str(tmp_path / 'train.csv'), '-o', str(tmp_path / 'train.csv')]) == 1
     assert capsys.readouterr().err.count('\n') == 1
     assert (tmp_path / 'train.csv').read_bytes() == before
+
+
+@pytest.fixture
+def files(base, recordings, tmp_path, monkeypatch):
+    """Write the model and, as one table of two trials, both recordings."""
+    monkeypatch.chdir(tmp_path)
+    base.save('base.yaml')
+    columns = {name: np.concatenate([one.columns[name] for one in recordings])
+               for name in ('time', 'voltage', 'angle')}
+    write_csv({'trial': np.repeat([0.0, 1.0], recordings[0].rows), **columns}, 'both.csv')
+    return ['extend', '--model', 'base.yaml', '--data', 'both.csv', '-o', 'new.yaml', '--json',
+            'new.json']
+
+
+def test_values_given_by_hand_are_taken_as_they_are(files, base, recordings):
+    assert main([*files, '--add', 'payload_error,encoder_offset', '--values',
+                 'encoder_offset.offset=2,payload_error.dm=14.5']) == 0
+    found = json.loads(open('new.json', encoding='utf-8').read())
+    assert found['parameters']['payload_error']['dm'] == {
+        'value': 14.5, 'low': 14.5, 'high': 14.5, 'unit': 'g'}
+    assert [step['model'] for step in found['steps']] == [
+        'base', '+ payload_error', '+ encoder_offset']
+    model = MuscleModel.load('new.yaml')
+    assert [effect.values for effect in model.effects] == [{'dm': 14.5}, {'offset': 2.0}]
+    assert model.provenance['extended'][-1]['by_hand'] is True
+    assert found['train']['rmse_after'] == pytest.approx(rmse(model, recordings))
+    assert found['train']['rmse_after'] < 0.2 * found['train']['rmse_before']
+
+
+def test_trials_that_are_not_named_are_not_fitted(files, base, recordings):
+    assert main([*files, '--add', 'payload_error', '--values', 'payload_error.dm=10',
+                 '--trials', '0']) == 0
+    found = json.loads(open('new.json', encoding='utf-8').read())
+    assert found['train']['rmse_before'] == pytest.approx(rmse(base, recordings[:1]))
+    assert found['test']['rmse_before'] == pytest.approx(rmse(base, recordings[1:]))
+
+
+@pytest.mark.parametrize('words, status, line', [
+    (['--values', 'slack.Ls=1'], 1, 'gives no value to payload_error'),
+    (['--values', 'payload_error.dm=1,slack.Ls=1'], 1, 'does not name slack'),
+    (['--values', 'payload_error.mass=1'], 1, "has no parameter 'mass'"),
+    (['--trials', '7'], 1, 'no trial 7; the table has trials 0, 1'),
+    (['--values', 'payload_error=1'], 2, 'is not EFFECT.PARAMETER=VALUE'),
+    (['--values', 'payload_error.dm=nan'], 2, 'is not EFFECT.PARAMETER=VALUE')])
+def test_values_and_trials_that_make_no_sense_are_refused(files, capsys, words, status, line):
+    try:
+        found = main([*files, '--add', 'payload_error', *words])
+    except SystemExit as left:
+        found = left.code
+    assert found == status and line in capsys.readouterr().err.splitlines()[-1]

@@ -56,9 +56,10 @@ def test_url_with_every_key_is_read():
     simulation = parse_url(
         'sim://bicep?speed=60&seed=3&recording=2&recording_time=100&time_constant=2&supply=24'
         '&drop=0.01&garbage=0.1&brownout=5&unplug_after=1&unplug_for=2&silent_after=3'
-        '&silent_for=4&deaf_after=5&deaf_for=6&supply_sag=0.4&payload_error=-1')
+        '&silent_for=4&deaf_after=5&deaf_for=6&supply_sag=0.4&payload_error=-1&effects_after=7')
     assert simulation == Simulation(60.0, 3, 2, 100.0, 2.0, 24.0, 0.01, 0.1, 5.0, 1.0, 2.0, 3.0,
-                                    4.0, 5.0, 6.0, {'supply_sag': 0.4, 'payload_error': -1.0})
+                                    4.0, 5.0, 6.0, {'supply_sag': 0.4, 'payload_error': -1.0},
+                                    effects_after=7.0)
 
 
 @pytest.mark.parametrize('url, words', [
@@ -93,6 +94,22 @@ def test_effects_reach_the_arm():
     for arm in (clean, heavy):
         arm.advance(30.0, 4.0)
     assert heavy.angle > clean.angle + 0.01
+
+
+def test_effects_can_begin_while_the_arm_runs():
+    """Until then it is the clean one; what belongs to the wires as they were built cannot."""
+    clean, heavy, later, loose = (make_plant(parse_url(f'sim://bicep?{keys}')).arm for keys in (
+        'seed=1', 'payload_error=1', 'seed=1&payload_error=1&effects_after=30',
+        'seed=1&series_compliance=1&effects_after=30'))
+    for arm in (clean, later, loose):
+        arm.advance(30.0, 4.0)
+    assert later.angle == loose.angle == clean.angle != heavy.angle
+    for arm in (clean, later, loose):
+        arm.advance(30.0, 4.0)
+    assert later.angle > clean.angle + 0.01 and loose.angle != clean.angle
+    for name in ('stress_dependence', 'unequal_muscles'):
+        with pytest.raises(ParameterError, match='cannot begin while the arm runs'):
+            check_url(f'sim://bicep?{name}=1&effects_after=30')
 
 
 def test_perfect_cable_delivers_every_byte():

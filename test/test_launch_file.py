@@ -76,8 +76,8 @@ def test_it_declares_its_arguments_and_starts_with_a_function(file):
     """Every argument has a default, so that the file starts alone."""
     *declared, function = file.generate_launch_description().given[0]
     assert [argument.given[0] for argument in declared] == list(file.ARGUMENTS) == [
-        'port', 'model_file', 'params_file', 'namespace', 'feedback', 'monitor', 'use_sim_time',
-        'description', 'rviz', 'aggregator']
+        'port', 'model_file', 'params_file', 'namespace', 'feedback', 'autostart', 'monitor',
+        'use_sim_time', 'description', 'rviz', 'aggregator']
     assert all(argument.named['description'] for argument in declared)
     assert function.named['function'] is file.start
 

@@ -2,15 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node model_monitor: the model beside the arm."""
 
+import functools
 import math
+import re
 
 from node_support import Graph, small_model
+import numpy as np
 import pytest
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from hysteresis_ros.background import Background
+from hysteresis_ros.diagnosis import monitor
+from hysteresis_ros.diagnosis.watch import Watch
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.measurements import read_measurement
+from hysteresis_ros.nodes.bridge_node import BridgeNode
 from hysteresis_ros.nodes.monitor_node import MonitorNode
 
 
@@ -138,3 +147,77 @@ def test_ambient_temperature_counts_where_the_model_knows_it(graph):
     monitor.measure(2, 3.0, 1.7)
     cool, warm = monitor.wait(2)
     assert warm < cool
+
+
+def test_services_say_what_cannot_be_done(graph, tmp_path):
+    """In one line, where the arm has not been seen to hold still, or nothing can be written."""
+    (tmp_path / 'file').write_text('', encoding='utf-8')
+    monitor = Monitor(graph, recording_folder=str(tmp_path / 'file'))
+    for service, start in (('diagnose', 'no hold of the arm has ended yet'),
+                           ('save_recording', 'not saved: no hold of the arm has ended yet')):
+        answer = graph.call(Trigger, f'model_monitor/{service}', Trigger.Request())
+        assert not answer.success and answer.message.startswith(start)
+    for number, voltage in enumerate((0.0, 2.0, 3.0)):
+        for second in (1, 11, 21):
+            monitor.measure(30 * number + second, voltage, 2.0)
+    monitor.node._monitor._watch = Watch(0.01)
+    for hold in monitor.node._monitor._pending:
+        monitor.node._monitor._watch.add(hold)
+    answer = graph.call(Trigger, 'model_monitor/save_recording', Trigger.Request())
+    assert not answer.success and answer.message.startswith('not saved: [Errno')
+    assert '\n' not in answer.message
+    answer = graph.call(Trigger, 'model_monitor/diagnose', Trigger.Request())
+    assert not answer.success
+    assert re.fullmatch('[23] holds of the arm have ended so far; a diagnosis needs 8',
+                        answer.message)
+
+
+def test_no_diagnosis_where_none_is_wanted(graph):
+    """The service says which parameter it is."""
+    monitor = Monitor(graph, diagnosis=False)
+    answer = graph.call(Trigger, 'model_monitor/diagnose', Trigger.Request())
+    assert not answer.success and 'the parameter diagnosis is false' in answer.message
+    assert not monitor.node._monitor._background.busy
+
+
+@pytest.mark.slow
+def test_effect_that_begins_in_mid_run_is_named(graph, tmp_path, monkeypatch):
+    """On the simulated board at sixty times real time, by another process."""
+    # At low priority, a machine that is busy with other tests would take very long.
+    monkeypatch.setattr(monitor, 'Background', functools.partial(Background, niceness=0))
+    bridge = graph.add(BridgeNode(context=graph.context, parameter_overrides=[
+        Parameter(name, value=value) for name, value in {
+            'port': 'sim://bicep?speed=60&seed=1&encoder_offset=1&effects_after=600',
+            'telemetry_rate': 1.0, 'telemetry_timeout': 5.0, 'setpoint_timeout': 60.0}.items()]))
+    node = graph.make(MonitorNode, recording_folder=str(tmp_path))
+    statuses, joints = graph.status(), graph.collect(JointState, 'joint_states')
+    setpoints = graph.publisher(Float64, 'voltage_setpoint')
+    graph.until(lambda: joints and node._predicted > 2, 'telemetry')
+
+    def passed():
+        return joints[-1].header.stamp.sec - joints[0].header.stamp.sec
+
+    def said(words):
+        return [status for status in statuses
+                if status.name == 'model_monitor' and words in status.message]
+
+    rng = np.random.default_rng(1)
+    while not said('the model lacks') and passed() < 20000.0:
+        setpoints.publish(Float64(data=float(rng.uniform(2.4, 5.6))))
+        end = passed() + 30.0
+        graph.until(lambda end=end: passed() >= end, 'the end of a hold')
+        # What came before the first message is not counted here.
+        assert node._monitor.diagnoses == 0 or passed() > 300.0
+    status = said('the model lacks')[-1]
+    assert 'the model lacks encoder_offset (offset ' in status.message and status.level == b'\1'
+    values = {pair.key: pair.value for pair in status.values}
+    assert values['missing effect'] == 'encoder_offset' and float(values['probability']) > 0.5
+    assert 5.0 < float(values['encoder_offset offset [deg]']) < 13.0
+    answer = graph.call(Trigger, 'model_monitor/save_recording', Trigger.Request())
+    assert answer.success and read_measurement(answer.message).settled
+    future = graph.probe.create_client(Trigger, 'model_monitor/diagnose').call_async(
+        Trigger.Request())
+    graph.until(future.done, 'the diagnosis', 60.0)
+    assert future.result().success
+    assert future.result().message.startswith('missing: encoder_offset (offset ')
+    assert bridge.active

@@ -55,6 +55,33 @@ def begin(method, period=0.01):
     return child
 
 
+FORGETTING = """
+import os, signal, time
+from hysteresis_ros.nodes.running import Ending
+
+waking = []
+def wake():
+    waking.append(True)
+    time.sleep(0.3)
+    print('woken', flush=True)
+
+ending = Ending()
+ending.call(wake)
+os.kill(os.getpid(), signal.SIGINT)
+while not waking:
+    time.sleep(0.01)
+ending.call(None)
+print('forgotten', flush=True)
+"""
+
+
+def test_what_is_woken_stays_until_it_is_woken():
+    """Else a guard condition is triggered that has been destroyed meanwhile: a traceback."""
+    done = subprocess.run([sys.executable, '-c', FORGETTING], text=True, capture_output=True,
+                          check=False, timeout=60)
+    assert (done.stdout, done.stderr) == ('woken\nforgotten\n', '')
+
+
 @pytest.mark.parametrize('first, second', [
     (signal.SIGINT, signal.SIGINT), (signal.SIGTERM, signal.SIGINT),
     (signal.SIGINT, signal.SIGTERM)])

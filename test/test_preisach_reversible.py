@@ -84,15 +84,3 @@ def test_dictionary_keeps_the_reversible_weights_and_reads_files_without():
 def test_bad_reversible_weights_are_refused(reversible):
     with pytest.raises(ParameterError):
         Preisach([0.0, 1.0, 2.0], [1.0, 1.0, 1.0], 0.0, reversible)
-
-
-def test_a_tilt_adds_a_line_through_the_middle_of_the_range():
-    rng = np.random.default_rng(4)
-    operator = Preisach([0.0, 1.0, 3.0], rng.uniform(0.1, 1.0, 3), 0.7, [0.2, 0.0])
-    tilted = operator.tilted(0.4)
-    for u in rng.uniform(0.0, 3.0, 30):
-        assert tilted.step(u) == pytest.approx(operator.step(u) + 0.4 * (u - 1.5), abs=1e-12)
-    assert Preisach.from_dict(tilted.to_dict()).to_dict() == tilted.to_dict()
-    again = operator.tilted(0.4)
-    assert again.input == 0.0 and operator.tilted(0.5).step(3.0) == pytest.approx(
-        operator.step(3.0) + 0.75)

@@ -60,8 +60,10 @@ def test_width_grows_or_shrinks_with_the_load_and_is_never_negative():
         slopes(model, -0.5).loop_width(loads, model.surroundings), [3.0, 2.5, 1.5, 0.0, 0.0])
 
 
-@pytest.mark.parametrize('g', [0.3, -0.4])
-@pytest.mark.parametrize('others', [(), ('stress_dependent_strain', 'series_compliance')])
+@pytest.mark.parametrize('g, others', [
+    (0.3, ()), (-0.4, ('stress_dependent_strain', 'series_compliance')),
+    (0.3, ('stress_dependent_strain', 'coulomb_friction')),
+    (-0.4, ('unequal_muscles', 'coulomb_friction'))])
 def test_the_inverse_brings_the_arm_to_its_targets(g, others):
     """What the controller asks for is what the forward model then does."""
     model = bicep_model(others)

@@ -69,7 +69,7 @@ class ArmBalance:
         self.has_dynamics = chain.moves
         compliance = chain.compliance()
         several = len(chain.offsets) > 1
-        wires, self.operators, memories = wires_of(operator, chain.offsets, compliance)
+        wires, self.operators, memories = wires_of(operator, chain, loaded)
         frictions = (0.0, self.coulomb, -self.coulomb) if self.coulomb > 0.0 else (0.0,)
         lines = [_line(statics, leverage, friction, self.base, chain, loaded)
                  for friction in frictions]
@@ -99,20 +99,20 @@ class ArmBalance:
         """Return the same arm with a state of its own."""
         other = copy.copy(self)
         other.operators, memories = with_own_memories(self.operators)
-        other._state = State(memories, self._state.motion.copy(), self._state.inputs.copy())
+        other._state = State(memories, self._state.motion.copy(), self._state.loads.copy())
         return other
 
     def snapshot(self) -> tuple[list[Any], np.ndarray, np.ndarray]:
         """Return the state for `rewind`."""
         return ([operator.snapshot() for operator in self.operators],
-                self._state.motion.copy(), self._state.inputs.copy())
+                self._state.motion.copy(), self._state.loads.copy())
 
     def rewind(self, snapshot: tuple[list[Any], np.ndarray, np.ndarray]) -> None:
         """Go back to a state that `snapshot` returned."""
-        memories, motion, inputs = snapshot
+        memories, motion, loads = snapshot
         for operator, memory in zip(self.operators, memories):
             operator.rewind(memory)
-        self._state.motion[:], self._state.inputs[:] = motion, inputs
+        self._state.motion[:], self._state.loads[:] = motion, loads
 
     def start(self) -> None:
         """Wipe the memory: after a full heat and cool cycle, before the first sample."""

@@ -2,13 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parallel muscles of unequal length as a controller needs them; see `kernels.bundle`."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.bicep.wires import kernels_for, wires_of
 from hysteresis_ros.kernels import bundle
 from hysteresis_ros.operators import HysteresisOperator
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model.chain import Chain
 
 
 class Bundle:
@@ -19,20 +24,18 @@ class Bundle:
     ----------
     operator : HysteresisOperator
         The second stage H2 of one muscle; it is copied for each.
-    offsets : tuple of float
-        Excess length dL_i [m] of each muscle.
-    compliance : float
-        Elastic compliance of a wire [m/N]; 0 stands for a typical wire's.
+    chain : Chain
+        Effects of the model: excess lengths of the muscles, and how a wire strains under its load.
+    loaded : bool
+        Whether the load is weighed against the drive.
     """
 
-    def __init__(self, operator: HysteresisOperator, offsets: Sequence[float],
-                 compliance: float = 0.0) -> None:
-        self._wires, self.operators, self._memories = wires_of(
-            operator, tuple(offsets), compliance)
+    def __init__(self, operator: HysteresisOperator, chain: Chain, loaded: bool) -> None:
+        self._wires, self.operators, self._memories = wires_of(operator, chain, loaded)
         self._kernels = kernels_for(operator, bundle)
         self._search = np.zeros(bundle.SEARCH)
         self._search[bundle.GAIN] = 1.0
-        self._inputs = np.empty(len(self.operators))
+        self._inputs = np.zeros(len(self.operators))
 
     def drive(self, output: float, load: float) -> float:
         """Return the x [N] under which the muscles give `output` [m] and bear `load` [N] each."""

@@ -2,23 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """The muscles that pull on one clamp, as kernels want them: tables and memories."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 import copy
 import types
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.kernels.bundle import Wires
 from hysteresis_ros.kernels.plain import Plain
-from hysteresis_ros.operators import HysteresisOperator, Preisach
+from hysteresis_ros.operators import HysteresisOperator
 from hysteresis_ros.operators.compiled import CompiledOperator
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model.chain import Chain
 
 # Compliance [m/N] of a wire whose own is not known.
 COMPLIANCE = 2e-4
+# Loads at which the factor on the strain and the loop's width are laid out, up to this many times
+# the bench's mean.
+LOADS, LARGEST = 1000, 8.0
 
 
-def wires_of(operator: HysteresisOperator, offsets: tuple[float, ...], compliance: float
+def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
              ) -> tuple[Wires, list[HysteresisOperator], Any]:
     """
     Return parallel muscles with memories of their own.
@@ -27,10 +35,10 @@ def wires_of(operator: HysteresisOperator, offsets: tuple[float, ...], complianc
     ----------
     operator : HysteresisOperator
         The second stage H2 of one muscle; it is copied for each.
-    offsets : tuple of float
-        Excess length dL_i [m] of each muscle; one entry for equal muscles.
-    compliance : float
-        Elastic compliance of a wire [m/N]; 0 stands for a typical wire's.
+    chain : Chain
+        Effects of the model: excess lengths of the muscles, and how a wire strains under its load.
+    loaded : bool
+        Whether the load is weighed against the drive.
 
     Returns
     -------
@@ -41,18 +49,22 @@ def wires_of(operator: HysteresisOperator, offsets: tuple[float, ...], complianc
     memories : ndarray, shape (muscles, entries)
         Their memories; of operators that are not compiled the operators themselves.
     """
-    compliance = compliance or COMPLIANCE
-    tolerance = 1e-10 * (operator.upper - operator.lower)
-    middle = 0.5 * (operator.lower + operator.upper)
-    inside = 0.0
-    if len(offsets) > 1 and isinstance(operator, Preisach):
-        # Of other operators the wires are elastic only beyond what H2 can give.
-        inside = compliance
-        operator = operator.tilted(inside)
     table: Any = operator.table if isinstance(operator, CompiledOperator) else None
+    offsets = np.array(chain.offsets, dtype=float)
     operators, memories = with_own_memories([operator] * len(offsets))
-    return (Wires(table, np.array(offsets, dtype=float), float(compliance), inside, middle,
-                  tolerance), operators, memories)
+    scales, widths, lightest, spacing = np.ones(1), np.zeros(1), 0.0, 1.0
+    plays = chain.plays and loaded
+    if plays or len(offsets) > 1:
+        loads = np.linspace(0.0, LARGEST * (chain.surroundings.load or 1.0), LOADS)
+        inside = chain.load_inside(loads) + 0.0 * loads
+        lightest, spacing = float(inside[0]), float(np.ptp(inside)) / (LOADS - 1)
+        even = np.linspace(inside[0], inside[-1], LOADS)
+        scales = np.interp(even, inside, chain.scale(loads) + 0.0 * loads)
+        if plays:
+            widths = np.interp(even, inside, chain.loop_width(loads))
+    return (Wires(table, operator.output_range[0], offsets,
+                  chain.compliance() or COMPLIANCE, 1e-10 * (operator.upper - operator.lower),
+                  scales, widths, lightest, spacing), operators, memories)
 
 
 def with_own_memories(operators: Sequence[HysteresisOperator]

@@ -130,11 +130,15 @@ class Board:
         for thread in self._threads:
             thread.start()
 
-    def stop(self) -> None:
+    def switch_off(self) -> bool:
         """
-        Switch the output off, wait a moment until the board says so, and close the port.
+        Switch the output off and wait a moment until the board says so.
 
-        It may be called again; `start` may not.
+        Returns
+        -------
+        bool
+            Whether it did, or is not there; else its watchdog switches off.
+
         """
         with self._wake:
             self._wanted = False
@@ -145,6 +149,16 @@ class Board:
             while (self._online and self._sample is not None and self._sample.enabled
                    and time.monotonic() < deadline):
                 self._wake.wait(deadline - time.monotonic())
+            return not (self._online and self._sample is not None and self._sample.enabled)
+
+    def stop(self) -> None:
+        """
+        Switch the output off, wait a moment until the board says so, and close the port.
+
+        It may be called again; `start` may not.
+        """
+        self.switch_off()
+        with self._wake:
             self._stopping.set()
             self._wake.notify_all()
         for thread in self._threads:

@@ -112,6 +112,40 @@ def add_report(parser: argparse.ArgumentParser) -> None:
                         help='write one page with all pictures')
 
 
+def add_trials(parser: argparse.ArgumentParser, others: str) -> None:
+    """Add the option that takes some trials of each recording; `others` says what the rest is."""
+    parser.add_argument('--trials', type=numbers, metavar='LIST',
+                        help=f'take only these trials of the recordings of --data; {others}')
+
+
+def divided(measurements: Sequence[Measurement], trials: Sequence[int] | None
+            ) -> tuple[list[Measurement], list[Measurement]]:
+    """
+    Divide recordings by their trials.
+
+    Parameters
+    ----------
+    measurements : sequence of Measurement
+    trials : sequence of int or None
+        Those to take; None for all.
+
+    Returns
+    -------
+    taken, others : list of Measurement
+
+    Raises
+    ------
+    MeasurementError
+        If a recording lacks one of them.
+
+    """
+    if trials is None:
+        return list(measurements), []
+    taken = [one.select(trials) for one in measurements]
+    rest = [[trial for trial in one.trials if trial not in trials] for one in measurements]
+    return taken, [one.select(names) for one, names in zip(measurements, rest) if names]
+
+
 def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
              settled: bool = False, columns: Collection[Mapped] = ()) -> list[Measurement]:
     """

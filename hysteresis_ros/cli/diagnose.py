@@ -9,8 +9,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, origin, read_all, say,
-    Subparsers, warn_of_loads, write_json)
+    add_data, add_json, add_model, add_report, add_settled, add_trials, divided, origin, read_all,
+    say, Subparsers, warn_of_loads, write_json)
 from hysteresis_ros.cli.rounds import BENCH, Rounds
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     add_model(parser)
     add_data(parser)
     add_settled(parser)
+    add_trials(parser, 'the others are not looked at')
     parser.add_argument('--jobs', type=int, default=-1, metavar='N',
                         help='processes (default: one for each core)')
     parser.add_argument('--seed', type=int, default=0, metavar='S',
@@ -44,7 +45,8 @@ def run(args: argparse.Namespace) -> None:
     from hysteresis_ros.api import diagnose, load_model
 
     model = load_model(args.model)
-    measurements = read_all(args.data, args.namespace, args.settled, args.columns)
+    measurements, _ = divided(
+        read_all(args.data, args.namespace, args.settled, args.columns), args.trials)
     rounds = Rounds(BENCH)
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed, progress=rounds)
     rounds.close()

@@ -5,17 +5,21 @@
 from __future__ import annotations
 
 import argparse
-
+from collections.abc import Mapping, Sequence
+import math
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_columns, add_json, add_model, add_report, add_settled, origin, read_all, say,
-    Subparsers, warn, write_json)
+    add_columns, add_json, add_model, add_report, add_settled, add_trials, divided, origin,
+    read_all, say, Subparsers, warn, write_json)
 from hysteresis_ros.cli.diagnose import UNITS
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
+from hysteresis_ros.errors import ParameterError
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.extend import Extension
+    from hysteresis_ros.effects import Effect
+    from hysteresis_ros.model import MuscleModel
 
 
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
@@ -36,6 +40,10 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         help='which arm to take from a bag that recorded several')
     add_columns(parser)
     add_settled(parser)
+    add_trials(parser, 'the others are not fitted')
+    parser.add_argument('--values', type=values_of, metavar='EFFECT.PARAMETER=VALUE,...',
+                        help='give the effects these values, in the units that `hysteresis '
+                        'effects` lists, and fit none of them')
     parser.add_argument('--force', action='store_true',
                         help='fit effects that the recordings cannot show, with a warning')
     parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='MODEL.yaml')
@@ -46,14 +54,18 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Do it."""
-    from hysteresis_ros.diagnosis.extend import extend
+    from hysteresis_ros.diagnosis.extend import extend, extend_by_hand
     from hysteresis_ros.model import MuscleModel
 
     model = MuscleModel.load(args.model)
-    train = read_all(args.data, args.namespace, args.settled, args.columns)
-    test = read_all(args.test, args.namespace, args.settled, args.columns)
+    train, unseen = divided(
+        read_all(args.data, args.namespace, args.settled, args.columns), args.trials)
+    test = [*unseen, *read_all(args.test, args.namespace, args.settled, args.columns)]
     names = [name.strip() for name in args.add.split(',') if name.strip()]
-    extension = extend(model, names, train, test, force=args.force)
+    if args.values is None:
+        extension = extend(model, names, train, test, force=args.force)
+    else:
+        extension = extend_by_hand(model, with_values(model, names, args.values), train, test)
     for note in extension.warnings:
         warn(note)
     extension.model.save(args.output)
@@ -65,6 +77,42 @@ def run(args: argparse.Namespace) -> None:
         from hysteresis_ros.report.diagnosis_page import write_extension
         write_extension(args.report, model, extension, train, test, args.output,
                         origin(args))
+
+
+def values_of(text: str) -> dict[str, dict[str, float]]:
+    """Read `EFFECT.PARAMETER=VALUE,...` as values by parameter by effect."""
+    found: dict[str, dict[str, float]] = {}
+    for part in text.split(','):
+        name, _, number = part.partition('=')
+        effect, _, parameter = name.strip().partition('.')
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if not (effect and parameter and math.isfinite(value)):
+            raise argparse.ArgumentTypeError(f'{part!r} is not EFFECT.PARAMETER=VALUE')
+        found.setdefault(effect, {})[parameter] = value
+    return found
+
+
+def with_values(model: MuscleModel, names: Sequence[str],
+                values: Mapping[str, Mapping[str, float]]) -> list[Effect]:
+    """
+    Return effects with values given by hand.
+
+    Raises
+    ------
+    ParameterError
+        If an effect is unknown, has no such parameter, or names and values do not go together.
+    """
+    from hysteresis_ros.effects import effect_class
+
+    for lacking, where in ((set(names) - set(values), '--values gives no value to'),
+                           (set(values) - set(names), '--add does not name')):
+        if lacking:
+            raise ParameterError(f'{where} {", ".join(sorted(lacking))}; name the same effects in '
+                                 '--add and --values')
+    return [effect_class(name)(model.surroundings, **values[name]) for name in names]
 
 
 def to_text(extension: Extension, response: str) -> str:

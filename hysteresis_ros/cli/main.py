@@ -17,7 +17,7 @@ from hysteresis_ros.errors import HysteresisError
 from hysteresis_ros.measurements import MeasurementWarning
 
 COMMANDS = ('identify', 'compare', 'diagnose', 'extend', 'invert', 'predict', 'simulate',
-            'effects', 'columns', 'operators', 'table1', 'demo')
+            'effects', 'columns', 'operators', 'table1', 'demo', 'studio')
 
 PACKAGE = 'hysteresis_ros'
 

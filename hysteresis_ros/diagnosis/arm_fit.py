@@ -4,13 +4,16 @@
 Fit effects to runs of an arm: maximum a posteriori, in whitened residuals, many sets at once.
 
 Gauss-Newton steps with Levenberg's damping. All sets advance together, so that each step is one
-batch of simulations, whatever their number.
+batch of simulations, whatever their number. For a first look at a set, derivatives are differences
+at the start and carried on by secants from there (Broyden's update; Madsen, Nielsen and Tingleff,
+Methods for non-linear least squares problems, 2004, sec. 3.5).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 import dataclasses
+import math
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -26,12 +29,12 @@ if TYPE_CHECKING:
 
 # Simulated responses are smooth only on this scale of the parameters' units.
 DIFFERENCE = 0.02
-MOST_STEPS = 12
+MOST_STEPS, POLISHING_STEPS = 12, 3
 # What the damping is divided by after a good step, and multiplied by after a bad one.
 EASIER, HARDER = 10.0, 30.0
 FIRST_DAMPING, MOST_DAMPING = 1e-2, 1e3
 # A step that gains less than this in the log posterior ends the fit.
-LEAST_GAIN = 0.02
+LEAST_GAIN = 0.1
 # Longest step in the parameters' units, in which their range is about one.
 LONGEST = 1.0
 # The base model's own error bends an estimate by up to about this share.
@@ -125,6 +128,8 @@ class _Walk:
         # Arrays (n,) and (n, k); None while they are not known at the vector.
         self.predicted: Any = None
         self.jacobian: Any = None
+        # Whether the derivatives are differences at the vector, not carried on from another.
+        self.fresh = False
         self.cost, self.active = np.inf, True
 
     def penalty(self, vector: np.ndarray) -> float:
@@ -140,6 +145,28 @@ class _Walk:
             vectors[-1][index] += step
             steps.append(step)
         return vectors, steps
+
+    def doubt(self) -> None:
+        """End where the derivatives are exact, else have them made anew."""
+        if self.fresh:
+            self.active = False
+        else:
+            self.jacobian = None
+
+    def step_to(self, vector: np.ndarray, predicted: np.ndarray, cost: float) -> None:
+        """Move to a vector (k,) with its response (n,) if that is better, and damp accordingly."""
+        if not cost < self.cost:
+            if self.fresh:
+                self.damping *= HARDER
+                self.active = self.damping < MOST_DAMPING
+            else:
+                self.jacobian = None
+            return
+        self.damping = max(self.damping / EASIER, 1e-6)
+        step = vector - self.vector
+        wrong = predicted - self.predicted - self.jacobian @ step
+        self.jacobian = self.jacobian + np.outer(wrong, step) / float(step @ step)
+        self.vector, self.predicted, self.cost, self.fresh = vector, predicted, cost, False
 
     def candidate(self, jacobian: np.ndarray, residual: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the vector after one step, and the cost that it saves by the linearisation."""
@@ -185,7 +212,7 @@ class Fitter:
         return float(np.sqrt(np.mean((self.problem.measured - predicted) ** 2)))
 
     def fit(self, sets: Sequence[Sequence[Effect]], point: Point,
-            steps: int = MOST_STEPS) -> list[Fit]:
+            steps: int = MOST_STEPS, exact: bool = True) -> list[Fit]:
         """
         Fit sets of effects from their present values; those whose simulation fails are left out.
 
@@ -196,6 +223,9 @@ class Fitter:
             Covariance of the residuals.
         steps : int
             Gauss-Newton steps at most.
+        exact : bool
+            Whether all derivatives are differences; if not, those after the first are carried on by
+            secants until a step fails.
 
         Returns
         -------
@@ -203,30 +233,29 @@ class Fitter:
         """
         walks = [_Walk(effects, self.problem.kind) for effects in sets]
         for walk, own in zip(walks, self._at(walks, [[w.vector] for w in walks])):
-            self._take(walk, walk.vector, own[0], point)
-            walk.active = bool(np.isfinite(walk.cost))
+            walk.predicted = own[0]
+            walk.cost = self._cost(walk, walk.vector, own[0], point)
+            walk.active = math.isfinite(walk.cost)
         walks = [walk for walk in walks if walk.active]
-        for left in range(steps, -1, -1):
+        for _ in range(steps):
             active = [walk for walk in walks if walk.active]
             if not active:
                 break
-            self._differentiate(active)
+            self._differentiate([walk for walk in active if walk.jacobian is None])
             active = [walk for walk in active if walk.active and len(walk.vector)]
-            if left == 0:
-                break
             steps_of = [walk.candidate(point.whiten(walk.jacobian), point.whiten(
                 self.problem.measured - walk.predicted)) for walk in active]
-            for walk, (_, saved) in zip(active, steps_of):
-                walk.active = saved > 2.0 * LEAST_GAIN
-            moves = [(walk, vector) for walk, (vector, _) in zip(active, steps_of) if walk.active]
+            moves = []
+            for walk, (vector, saved) in zip(active, steps_of):
+                if saved > 2.0 * LEAST_GAIN:
+                    moves.append((walk, vector))
+                else:
+                    walk.doubt()
             for (walk, vector), (predicted,) in zip(moves, self._at(
                     [walk for walk, _ in moves], [[vector] for _, vector in moves])):
-                if self._take(walk, vector, predicted, point):
-                    walk.damping = max(walk.damping / EASIER, 1e-6)
+                walk.step_to(vector, predicted, self._cost(walk, vector, predicted, point))
+                if exact and not walk.fresh:
                     walk.jacobian = None
-                else:
-                    walk.damping *= HARDER
-                    walk.active = walk.damping < MOST_DAMPING
         self._differentiate([walk for walk in walks if walk.jacobian is None])
         return [self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
                                walk.predicted, walk.jacobian))
@@ -247,18 +276,15 @@ class Fitter:
             walk.jacobian = np.zeros((len(walk.predicted), len(steps)))
             for index, (step, response) in enumerate(zip(steps, own)):
                 walk.jacobian[:, index] = (response - walk.predicted) / step
+            walk.fresh = True
             walk.active = walk.active and bool(np.all(np.isfinite(walk.jacobian)))
 
-    def _take(self, walk: _Walk, vector: np.ndarray, predicted: np.ndarray, point: Point) -> bool:
-        """Move a walk to a vector if that is better."""
+    def _cost(self, walk: _Walk, vector: np.ndarray, predicted: np.ndarray, point: Point) -> float:
+        """Return minus twice the log posterior at a vector (k,), but for a constant."""
         if not np.all(np.isfinite(predicted)):
-            return False
+            return math.inf
         whitened = point.whiten(self.problem.measured - predicted)
-        cost = float(whitened @ whitened) + walk.penalty(vector)
-        if cost >= walk.cost:
-            return False
-        walk.vector, walk.predicted, walk.cost = vector, predicted, cost
-        return True
+        return float(whitened @ whitened) + walk.penalty(vector)
 
     def judge(self, fit: Fit) -> Fit:
         """
@@ -282,7 +308,7 @@ class Fitter:
             residual = point.whiten(self.problem.measured - fit.predicted)
             jacobian = point.whiten(fit.jacobian) if len(fit.vector) else fit.jacobian
             matrix = jacobian.T @ jacobian + np.diag(spread ** -2.0)
-            evidence = (point.constant - 0.5 * float(residual @ residual) + prior
+            evidence = (float(point.log_density(residual)) + prior
                         - 0.5 * float(np.linalg.slogdet(matrix)[1]))
             if evidence > best.log_evidence:
                 best = dataclasses.replace(
@@ -299,13 +325,22 @@ class Fitter:
         return self.judge(dataclasses.replace(
             fit, covariance=own, judged=0, log_evidence=-np.inf))
 
+    def polished(self, fit: Fit) -> Fit:
+        """Fit the effects once more, under the covariance that the fit is judged by."""
+        if not len(fit.vector):
+            return fit
+        again = [self.judge(dataclasses.replace(one, covariance=fit.covariance, judged=0,
+                                                log_evidence=-np.inf))
+                 for one in self.fit([fit.effects], self.point(fit), POLISHING_STEPS)]
+        return max([fit, *again], key=lambda one: one.log_evidence)
+
     def refined(self, fit: Fit) -> Fit:
         """Fit the covariance to the residual of a fit, then the effects under it once more."""
         own = fit.covariance or self.covariance
         values = own.fit(self.problem.measured - fit.predicted, fit.require_values())
         self.covariance.add(values)
         point = own.point(values)
-        better = self.fit([fit.effects], point, steps=3) if len(fit.vector) else []
+        better = self.fit([fit.effects], point, POLISHING_STEPS) if len(fit.vector) else []
         better = [one if fit.covariance is None else self.along(one) for one in better]
         return max([self.judge(fit), *better], key=lambda one: one.log_evidence)
 

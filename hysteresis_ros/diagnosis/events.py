@@ -55,12 +55,13 @@ def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | No
              for shape in shapes]
     for point in selection.covariance.points:
         whitened = point.whiten(residual)
-        base = point.constant - 0.5 * float(whitened @ whitened)
         for shape, explains in zip(shapes, large):
             columns = point.whiten(steps * shape[:, None])
             precision = np.sum(columns ** 2, axis=0) + 1.0 / prior
             slope = columns.T @ whitened
-            evidence = base + 0.5 * slope ** 2 / precision - 0.5 * np.log(precision * prior)
+            size = slope / precision
+            evidence = (point.log_density(whitened[:, None] - columns * size)
+                        - 0.5 * size ** 2 / prior - 0.5 * np.log(precision * prior))
             evidence[~explains] = -np.inf
             index = int(np.argmax(evidence))
             if evidence[index] > best:

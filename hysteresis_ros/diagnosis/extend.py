@@ -159,12 +159,53 @@ def extend(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement
     warnings = _unobservable(model, names, train, force)
     problem, classes, fits = _fitted(model, names, train)
     warnings += [note for effect in fits[-1][0] for note in undetermined(effect, problem.kind)]
+    stages = [(f'+ {kind.id}', effects) for kind, (effects, _) in zip(classes, fits)]
+    return _gained(model, problem, stages, train, test, fits[-1][1], warnings)
+
+
+@one_blas_thread()
+def extend_by_hand(model: MuscleModel, effects: Sequence[Effect], train: Sequence[Measurement],
+                   test: Sequence[Measurement] = ()) -> Extension:
+    """
+    Add effects with the values that they have, and show the error before and after.
+
+    Nothing is fitted but, on bench tables, the weights.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    effects : sequence of Effect
+        In the order in which they are added.
+    train, test : sequence of Measurement
+        As for `extend`.
+
+    Returns
+    -------
+    Extension
+
+    Raises
+    ------
+    ParameterError, MeasurementError
+        As `extend`, but an effect that cannot show in these recordings is no error.
+    """
+    problem_for(model, [*train, *test])
+    problem, classes = _without(model, [effect.id for effect in effects], train)
+    stages = [(f'+ {kind.id}', list(effects[:number])) for number, kind in enumerate(classes, 1)]
+    implausible = [f'{effect.id}.{name}' for effect in effects for name in effect.implausible()]
+    return _gained(model, problem, stages, train, test, implausible, [], by_hand=True)
+
+
+def _gained(model: MuscleModel, problem: ArmProblem | BenchProblem,
+            stages: Sequence[tuple[str, list[Effect]]], train: Sequence[Measurement],
+            test: Sequence[Measurement], implausible: list[str], warnings: list[str],
+            by_hand: bool = False) -> Extension:
+    """Return what effects gain that are added in stages, each with its name."""
     judged = list(test) or list(train)
     models = [('base', model)]
-    for kind, (effects, _) in zip(classes, fits):
-        models.append((f'+ {kind.id}', problem.completed([*problem.model.effects, *effects])))
-    added, implausible = fits[-1]
-    extended = _stamped(models[-1][1], added, train, problem.kind)
+    for name, effects in stages:
+        models.append((name, problem.completed([*problem.model.effects, *effects])))
+    added = stages[-1][1]
+    extended = _stamped(models[-1][1], added, train, problem.kind, by_hand)
     models[-1] = (models[-1][0], extended)
     steps = [(name, rmse(one, judged)) for name, one in models]
     # Where weights are refitted, the fair base is one that was refitted to the same rows.
@@ -232,16 +273,27 @@ def undetermined(effect: Effect, kind: str) -> list[str]:
 def _fitted(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]
             ) -> tuple[ArmProblem | BenchProblem, list[type[Effect]], list[Fitted]]:
     """Return the problem without the effects named, their classes, and the fit after each."""
+    problem, classes = _without(model, names, train)
+    return problem, classes, (_on_bench(problem, model, classes) if problem.refits
+                              else _on_arm(problem, model, classes))
+
+
+def _without(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]
+             ) -> tuple[ArmProblem | BenchProblem, list[type[Effect]]]:
+    """Return the problem without the effects named, and their classes."""
     classes = _checked(problem_for(model, train), names)
-    replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
-    base = model.with_effects([e for e in model.effects if e.id not in replaced])
-    problem = problem_for(base, train)
+    problem = problem_for(base_of(model, classes), train)
     for kind in classes:
         if problem.kind not in kind.kinds:
             raise ParameterError(f'effect {kind.id} cannot be fitted to a {problem.kind} '
                                  'measurement; give an arm run')
-    return problem, classes, (_on_bench(problem, model, classes) if problem.refits
-                              else _on_arm(problem, model, classes))
+    return problem, classes
+
+
+def base_of(model: MuscleModel, classes: Iterable[type[Effect]]) -> MuscleModel:
+    """Return the model without what effects of these classes take the place of."""
+    replaced = {name for kind in classes for name in (kind.id, *kind.replaces)}
+    return model.with_effects([e for e in model.effects if e.id not in replaced])
 
 
 def _checked(problem: ArmProblem | BenchProblem, names: Iterable[str]) -> list[type[Effect]]:
@@ -292,7 +344,7 @@ def _on_arm(problem: ArmProblem, model: MuscleModel, classes: Sequence[type[Effe
 
 
 def _stamped(model: MuscleModel, added: Iterable[Effect], train: Iterable[Measurement],
-             kind: str) -> MuscleModel:
+             kind: str, by_hand: bool = False) -> MuscleModel:
     """Note in the provenance what was added from which recordings."""
     provenance = dict(model.provenance)
     history = list(provenance.get('extended', []))
@@ -301,6 +353,7 @@ def _stamped(model: MuscleModel, added: Iterable[Effect], train: Iterable[Measur
         'effects': [effect.id for effect in added],
         'data': [{'source': str(m.source).rsplit('/', 1)[-1],
                   'sha256': m.digest or hashlib.sha256(
-                      m.column(m.response).tobytes()).hexdigest()} for m in train]})
+                      m.column(m.response).tobytes()).hexdigest()} for m in train],
+        **({'by_hand': True} if by_hand else {})})
     provenance['extended'] = history
     return dataclasses.replace(model, provenance=provenance)

@@ -82,14 +82,16 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[St
             # What the bench says of it is as good a start as any.
             starts.append(own[name])
     walks = [_Moves(start, fit.effects, problem.kind) for start in starts]
-    responses = iter(fitter.simulate([effects for walk in walks for effects in walk.sets]))
-    for walk in walks:
-        given = np.stack([next(responses) for _ in walk.sets])
-        if not np.all(np.isfinite(given)):
+    # What is moved a little takes up the phase of where it is moved from.
+    responses = fitter.simulate([walk.at for walk in walks])
+    moved = iter(fitter.simulate([effects for walk in walks for effects in walk.moved]))
+    for walk, response in zip(walks, responses):
+        given = np.reshape([next(moved) for _ in walk.moved], (-1, len(response)))
+        if not (np.all(np.isfinite(response)) and np.all(np.isfinite(given))):
             continue
-        jacobian = (given[1:] - given[0]).T / np.array(walk.steps)
+        jacobian = (given - response).T / np.array(walk.steps)
         mean, spread = walk.parameters.prior()
-        found.append(Start(walk.start, given[0] - fit.predicted + jacobian @ (
+        found.append(Start(walk.start, response - fit.predicted + jacobian @ (
             mean - walk.vector), jacobian * spread))
     return found
 
@@ -102,13 +104,14 @@ class _Moves:
         self.start = start
         self.parameters = ParameterVector([start], kind)
         self.vector = self.parameters.vector()
-        self.sets: list[list[Effect]] = [[*others, start]]
+        self.at: list[Effect] = [*others, start]
+        self.moved: list[list[Effect]] = []
         self.steps: list[float] = []
         for index, value in enumerate(self.vector):
             step = 0.02 if value + 0.02 < self.parameters.upper[index] else -0.02
             moved = self.vector.copy()
             moved[index] += step
-            self.sets.append([*others, *self.parameters.with_vector(moved)])
+            self.moved.append([*others, *self.parameters.with_vector(moved)])
             self.steps.append(step)
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.effects import Effect
+from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.metrics import largest_noise, resolution_noise
 from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.model.simulation import Simulator
@@ -27,6 +28,14 @@ MOST_ROWS = 400
 MOST_FOLDS = 4
 # Blocks for significance: about this many a recording.
 BLOCKS = 24
+
+
+def judged_rows(measurement: Measurement) -> np.ndarray:
+    """Return the rows (n,) that are no history, which only says what the muscle remembers."""
+    history = measurement.columns.get('history')
+    if history is None:
+        return np.arange(measurement.rows)
+    return np.flatnonzero(history == 0.0)
 
 
 class Problem:
@@ -67,10 +76,13 @@ class Problem:
         self.kind = measurements[0].kind
         self.response = measurements[0].response
         self.settled = all(m.settled for m in measurements)
-        rows = sum(m.rows for m in measurements)
+        rows = sum(len(judged_rows(m)) for m in measurements)
         self.stride = max(1, rows // MOST_ROWS)
         self.simulators = [Simulator(model, m) for m in measurements]
-        self.chosen = [np.arange(0, m.rows, self.stride) for m in measurements]
+        self.chosen = [judged_rows(m)[::self.stride] for m in measurements]
+        if not any(map(len, self.chosen)):
+            raise MeasurementError(f'{measurements[0].source}: every row is history (the column '
+                                   "'history' is not 0), so none is left to judge")
         self.measured = self.pick([m.column(m.response) for m in measurements])
         self.noise = max(resolution_noise(m) for m in measurements)
         self.largest_noise = max(largest_noise(m) for m in measurements)

@@ -150,8 +150,7 @@ class Selection:
         if not valid:
             return True
         best = next((names for names in valid if self.sufficient(names)), valid[0])
-        form = self.settings.form * self.noise_free_rmse(frozenset()) if best else 0.0
-        if self.noise_free_rmse(best) > math.hypot(self.rmse_95, form):
+        if self.noise_free_rmse(best) > self.rmse_95:
             return True
         # What a further effect explains has to exceed the base model's own error.
         return bool(best) and self.error(best) > self.covariance.size and self._promising(best)
@@ -196,7 +195,7 @@ class Selection:
         others = [one for one in fit.effects if one.id not in effect.replaces]
         starts = [*starts_of(effect, self.problem.kind, self.problem.measured), effect]
         found = self.fitter.fit([[*others, start] for start in starts], self._metric(),
-                                FIRST_STEPS)
+                                FIRST_STEPS, exact=False)
         found.sort(key=lambda one: -one.log_evidence)
         found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
         return self.fitter.refined(max(found, key=lambda one: one.log_evidence))
@@ -224,7 +223,7 @@ class Selection:
         order = sorted(scored.values(), key=lambda item: -item[0])
         begun = self.fitter.fit(
             [effects for _, effects in order[:BEGUN * self.settings.refits]],
-            self._metric(), FIRST_STEPS)
+            self._metric(), FIRST_STEPS, exact=False)
         begun.sort(key=lambda fit: -fit.log_evidence)
         self._fit([fit.effects for fit in begun[:self.settings.refits]])
 
@@ -257,7 +256,7 @@ class Selection:
     def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
         for fit in self.fitter.fit(sets, self._metric()):
-            self._keep(self.fitter.along(fit))
+            self._keep(self.fitter.polished(self.fitter.along(fit)))
 
     def _metric(self) -> Point:
         """Return the covariance in whose units fits are made: the expected discrepancy's."""
@@ -279,6 +278,8 @@ class Selection:
             self.fits[names] = self.fitter.refined(self.fits[names])
             least = self.fitter.least_squares(self.fits[names])
             self._least_errors[names] = self.fitter.error(least.predicted)
+            # Under a covariance the way to the maximum is rough, and not under white noise.
+            self._keep(self.fitter.polished(self.fitter.along(least)))
             self._errors.pop(names, None)
         self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
         self.base = self.fits[frozenset()]
@@ -382,10 +383,18 @@ class Selection:
                                    if 0 < len(other) <= len(names))
 
     def _would_do(self, without: frozenset[str], names: frozenset[str]) -> bool:
-        """Whether a smaller set may be the answer, and is not clearly less probable."""
+        """
+        Whether a smaller set may be the answer, and is not clearly less probable.
+
+        Where it leaves more than the base model's own error could be, and the larger set does not,
+        it must not be less probable at all.
+        """
+        if not self.sufficient(without) or self.fits[without].implausible():
+            return False
         odds = self.log_posterior(names) - self.log_posterior(without)
-        return (self.sufficient(without) and not self.fits[without].implausible()
-                and odds < -math.log(self.settings.reported))
+        if self.noise_free_rmse(without) > self.rmse_95 >= self.noise_free_rmse(names):
+            return odds < 0.0
+        return odds < -math.log(self.settings.reported)
 
 
 def _subsets(names: frozenset[str]) -> list[frozenset[str]]:

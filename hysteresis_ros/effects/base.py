@@ -117,7 +117,8 @@ class Surroundings(NamedTuple):
     drive where that is no voltage or current), `span` the response's range, `drive`, `load_name`
     and `response` what they are. `cold` is the drive that every trial starts from, `drive_range`
     the width of the range seen, and `sign` is -1 for a muscle that gets shorter when driven, 1 for
-    one that gets longer.
+    one that gets longer. `rest_load` is the load under which the cold muscle has its resting
+    length, and `least` the response of H2 where it has transformed altogether.
     """
 
     length: float
@@ -130,6 +131,8 @@ class Surroundings(NamedTuple):
     cold: float = 0.0
     drive_range: float = 1.0
     sign: int = -1
+    rest_load: float = 0.0
+    least: float = 0.0
 
 
 class Effect(abc.ABC):

@@ -85,7 +85,7 @@ class StressDependentStrain(MaterialEffect):
     sentence = 'The transformation strain grows with the load and saturates.'
     equation = ("S(F) = (1 - r exp(-F / F0)) / (1 - r exp(-Fm / F0)), Fm the bench's mean load; on "
                 'the arm alone: + growth (1 - exp(-F / F0)) above the line, from no load where r '
-                'is known, else from Fm')
+                'is known, else from Fm; the cold muscle at rest keeps its length')
     source = 'orientation of martensite variants under stress'
     shows_in = 'load, cold side'
     experiment = 'the same loop under three or more loads'
@@ -102,13 +102,22 @@ class StressDependentStrain(MaterialEffect):
 
     def scale(self, load: Values, surroundings: Surroundings) -> Values:
         """Grow with the load, one at the bench's mean load."""
-        missing = np.exp(-np.maximum(load, 0.0) / (self.F0 * surroundings.load))
-        at_mean = math.exp(-1.0 / self.F0)
-        # As for the shift of `stress_dependence`.
-        pivot = 1.0 if self.r else at_mean
-        share = 1.0 - self.r * missing + self.growth * (pivot - missing)
+        on_bench, growth = self._shares(load, surroundings)
         # A stroke of nothing could not be inverted.
-        return np.maximum(share, 0.02) / max(1.0 - self.r * at_mean, 0.02)
+        return np.maximum(on_bench + growth, 0.02) / max(
+            1.0 - self.r * math.exp(-1.0 / self.F0), 0.02)
+
+    def stretch(self, load: Values, surroundings: Surroundings) -> Values:
+        """Return what keeps the cold muscle's resting length, whatever the growth."""
+        on_bench, growth = self._shares(np.float64(surroundings.rest_load), surroundings)
+        return 0.0 * load + float(growth / max(on_bench, 0.02)) * surroundings.least
+
+    def _shares(self, load: Values, surroundings: Surroundings) -> tuple[Values, Values]:
+        """Return the share of the strain under a load on the bench, and what the arm adds to it."""
+        missing = np.exp(-np.maximum(load, 0.0) / (self.F0 * surroundings.load))
+        # As for the shift of `stress_dependence`.
+        pivot = 1.0 if self.r else math.exp(-1.0 / self.F0)
+        return 1.0 - self.r * missing, self.growth * (pivot - missing)
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:

@@ -72,11 +72,11 @@ class Arm(NamedTuple):
 
 
 class State(NamedTuple):
-    """What an arm remembers: memory of each muscle, motion, and room for each muscle's input."""
+    """What an arm remembers: memory and load beyond x of each muscle, and motion."""
 
     memories: np.ndarray
     motion: np.ndarray
-    inputs: np.ndarray
+    loads: np.ndarray
 
 
 @lean

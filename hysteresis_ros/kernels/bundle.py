@@ -4,9 +4,10 @@
 Parallel muscles of unequal length, which share the load as their own memories allow.
 
 A muscle that lacks dL_i is stretched further than the mean one and bears more. What it bears more
-stretches its wire elastically, too: ``H2[u_i] + c (u_i - u) = L - dL_i``, with c the compliance, u
-the input that goes with the mean load, and L what the transformation gives under that. A
-compliance is a reversible weight, so H2 with it has an exact inverse, which no plateau interrupts.
+strains its wire further, and stretches it elastically:
+``S(F_i) (H2[u_i] - L0) + c (F_i - F) = S(F) (H - L0) - dL_i``, with S the factor on the strain
+under a load, c the compliance, F the load of the mean muscle, and H what the transformation gives
+under that load. u_i follows ``v_i = F_i - x`` with the play that its own load says (`load_play`).
 """
 
 from typing import NamedTuple
@@ -15,51 +16,122 @@ import numpy as np
 
 from . import root
 from .lean import lean
-from .operator import last_input, last_output, solve, step
+from .load_play import held
+from .operator import last_input, last_output, peek, step
 
 # About how far muscles go for a load that is missing [m/N], to begin a search with.
 TYPICAL_COMPLIANCE = 1e-3
 # What the search needs in an array: its own entries and the factor on the first step.
 GAIN = root.SIZE
 SEARCH = root.SIZE + 1
+# Evaluations in the search for the input of one muscle.
+MOST_EVALUATIONS = 60
 
 
 class Wires(NamedTuple):
     """
     Parallel muscles, each with a memory of its own.
 
-    `table` is that of H2 with the compliance `inside` [m/N], which is 0 where the wires are
-    elastic only beyond what H2 can give; `offsets` (M,) [m] are the excess lengths, `compliance`
-    [m/N] that of a wire, `middle` [N] the middle of H2's input range, and `tolerance` [N] the load
-    that may be missing.
+    `table` is that of H2 and `base` [m] its least output; `offsets` (M,) [m] are the excess
+    lengths, `compliance` [m/N] that of a wire, and `tolerance` [N] the load that may be missing.
+    `scales` (m,) is the factor on the strain, and `widths` (m,) by how much the loop is wider than
+    that of H2, at loads `spacing` [N] apart from `lightest` on, as the transformation feels them.
     """
 
     table: np.ndarray
+    base: float
     offsets: np.ndarray
     compliance: float
-    inside: float
-    middle: float
     tolerance: float
+    scales: np.ndarray
+    widths: np.ndarray
+    lightest: float
+    spacing: float
 
 
 @lean
-def inputs_for(wires: Wires, memories: np.ndarray, output: float, mean: float, inputs: np.ndarray
-               ) -> None:
-    """Put each muscle's input ``u_i = F_i - x`` for an output under a mean one into `inputs`."""
-    stretched = output + wires.inside * (mean - wires.middle)
+def scale_at(wires: Wires, load: float) -> float:
+    """Return the factor on the strain under a load, as the transformation feels it."""
+    return _looked_up(wires, wires.scales, load)
+
+
+@lean
+def _looked_up(wires: Wires, values: np.ndarray, load: float) -> float:
+    """Return the value of a table (m,) under a load, as the transformation feels it."""
+    last = len(values) - 1
+    if last == 0:
+        return values[0]
+    place = min(max((load - wires.lightest) / wires.spacing, 0.0), float(last))
+    k = min(int(place), last - 1)
+    return values[k] + (place - k) * (values[k + 1] - values[k])
+
+
+@lean
+def input_for(wires: Wires, memory: np.ndarray, v: float, x: float) -> float:
+    """Return the input of H2 of a muscle with ``v = F - x``."""
+    return held(last_input(wires.table, memory), v, _looked_up(wires, wires.widths, v + x))
+
+
+@lean
+def loads_for(wires: Wires, memories: np.ndarray, output: float, load: float, x: float,
+              loads: np.ndarray) -> None:
+    """
+    Put each muscle's ``v_i = F_i - x`` for an output under a mean load into `loads`.
+
+    What is there is where the search begins.
+    """
     for i in range(len(wires.offsets)):
-        wanted = stretched - wires.offsets[i]
-        u, given, _ = solve(wires.table, memories[i], wanted)
-        inputs[i] = u + (wanted - given) / wires.compliance
+        loads[i] = _load_for(wires, memories[i], wires.offsets[i], output, load, x, loads[i])
 
 
 @lean
-def mean_load(inputs: np.ndarray, x: float) -> float:
-    """Return the mean load for each muscle's input; a wire cannot push."""
+def _load_for(wires: Wires, memory: np.ndarray, offset: float, output: float, load: float,
+              x: float, start: float) -> float:
+    """Return v of one muscle, by stepping outward and then by false position."""
+    tolerance = wires.tolerance * wires.compliance
+    near = start
+    here = _excess(wires, memory, near, offset, output, load, x)
+    if abs(here) <= tolerance:
+        return near
+    # The elastic part alone brings a muscle where it has to be on this way.
+    limit = near - here * scale_at(wires, load) / wires.compliance
+    stride = -here / TYPICAL_COMPLIANCE
+    far, there, count = near, here, 0
+    while here * there > 0.0 and count < MOST_EVALUATIONS:
+        near, here = far, there
+        far = near + stride
+        far = min(far, limit) if stride > 0.0 else max(far, limit)
+        there = _excess(wires, memory, far, offset, output, load, x)
+        stride *= 2.0
+        count += 1
+    while abs(there) > tolerance and there != here and count < MOST_EVALUATIONS:
+        point = far - there * (far - near) / (there - here)
+        value = _excess(wires, memory, point, offset, output, load, x)
+        if value * there < 0.0:
+            near, here = far, there
+        else:
+            here *= 0.5
+        far, there = point, value
+        count += 1
+    return far
+
+
+@lean
+def _excess(wires: Wires, memory: np.ndarray, v: float, offset: float, output: float, load: float,
+            x: float) -> float:
+    """Return how much longer a muscle with a load v + x is than the others let it be [m]."""
+    mean, given = scale_at(wires, load), peek(wires.table, memory, input_for(wires, memory, v, x))
+    return (scale_at(wires, v + x) * (given - wires.base)
+            + wires.compliance * (v + x - load) + offset) / mean - (output - wires.base)
+
+
+@lean
+def mean_load(loads: np.ndarray, x: float) -> float:
+    """Return the mean load for each muscle's v; a wire cannot push."""
     total = 0.0
-    for i in range(len(inputs)):
-        total += max(inputs[i] + x, 0.0)
-    return total / len(inputs)
+    for i in range(len(loads)):
+        total += max(loads[i] + x, 0.0)
+    return total / len(loads)
 
 
 @lean
@@ -76,25 +148,15 @@ def mean_output(wires: Wires, memories: np.ndarray) -> float:
     """Return what the transformation gives [m], the mean of the muscles."""
     total = 0.0
     for i in range(len(wires.offsets)):
-        total += (last_output(wires.table, memories[i])
-                  - wires.inside * (last_input(wires.table, memories[i]) - wires.middle))
+        total += last_output(wires.table, memories[i])
     return total / len(wires.offsets)
 
 
 @lean
-def mean_offset(wires: Wires) -> float:
-    """Return the mean of the excess lengths [m]."""
-    total = 0.0
+def commit(wires: Wires, memories: np.ndarray, loads: np.ndarray, x: float) -> None:
+    """Commit each muscle's v."""
     for i in range(len(wires.offsets)):
-        total += wires.offsets[i]
-    return total / len(wires.offsets)
-
-
-@lean
-def commit(wires: Wires, memories: np.ndarray, inputs: np.ndarray) -> None:
-    """Commit each muscle's input."""
-    for i in range(len(wires.offsets)):
-        step(wires.table, memories[i], inputs[i])
+        step(wires.table, memories[i], input_for(wires, memories[i], loads[i], x))
 
 
 @lean
@@ -105,17 +167,17 @@ def keep_gain(search: np.ndarray, at: int, moved: float, scale: float, here: flo
 
 @lean
 def drive(wires: Wires, memories: np.ndarray, search: np.ndarray, output: float, load: float,
-          inputs: np.ndarray) -> float:
+          loads: np.ndarray) -> float:
     """Return the x [N] under which the muscles give `output` [m] and bear `load` [N] each."""
     near = load - mean_input(wires, memories)
-    inputs_for(wires, memories, output, load - near, inputs)
-    here = load - mean_load(inputs, near)
+    loads_for(wires, memories, output, load, near, loads)
+    here = load - mean_load(loads, near)
     if abs(here) <= wires.tolerance:
         return near
     x = root.begin(search, 0, near, here, search[GAIN] * here, -np.inf, np.inf, wires.tolerance)
     while root.searching(search, 0):
-        inputs_for(wires, memories, output, load - x, inputs)
-        x = root.proceed(search, 0, load - mean_load(inputs, x))
+        loads_for(wires, memories, output, load, x, loads)
+        x = root.proceed(search, 0, load - mean_load(loads, x))
     keep_gain(search, 0, x - near, 1.0, here)
     return x
 
@@ -128,16 +190,17 @@ def respond(wires: Wires, memories: np.ndarray, search: np.ndarray, x: float, lo
 
     Commits nothing; the output is looked for between `low` and `high`, first at `near`.
     """
-    near = min(max(near, low), high)
-    inputs_for(wires, memories, near, load - x, inputs)
+    output = near = min(max(near, low), high)
+    loads_for(wires, memories, near, load, x, inputs)
     here = load - mean_load(inputs, x)
-    if abs(here) <= wires.tolerance:
-        return near
-    output = root.begin(search, 0, near, here, TYPICAL_COMPLIANCE * search[GAIN] * here, low, high,
-                        wires.tolerance)
-    while root.searching(search, 0):
-        inputs_for(wires, memories, output, load - x, inputs)
-        output = root.proceed(search, 0, load - mean_load(inputs, x))
-    if low < output < high:
-        keep_gain(search, 0, output - near, TYPICAL_COMPLIANCE, here)
+    if abs(here) > wires.tolerance:
+        output = root.begin(search, 0, near, here, TYPICAL_COMPLIANCE * search[GAIN] * here, low,
+                            high, wires.tolerance)
+        while root.searching(search, 0):
+            loads_for(wires, memories, output, load, x, inputs)
+            output = root.proceed(search, 0, load - mean_load(inputs, x))
+        if low < output < high:
+            keep_gain(search, 0, output - near, TYPICAL_COMPLIANCE, here)
+    for i in range(len(inputs)):
+        inputs[i] = input_for(wires, memories[i], inputs[i], x)
     return output

@@ -62,14 +62,8 @@ def settle_bundle(arm: Arm, state: State, line: int, x: float, offset: float, fa
     if not math.isnan(motion[ANGLE]):
         k, share = present(arm, motion)
         near = min(max(k - 1 + share, 0.0), float(last))
-    point, play = near, 0.0
-    if arm.plays:
-        k, share, here = _lacking_kept(arm, state, line, x, offset, factor, dt)
-        if here > 0.0:
-            play = 1.0
-            if here <= width(arm, line, k, share) and not math.isnan(motion[ANGLE]):
-                return k, share
-    k, share, here = _lacking_bundle(arm, state, line, point, x, offset, factor, dt, play)
+    point = near
+    k, share, here = _lacking_bundle(arm, state, line, point, x, offset, factor, dt)
     if abs(here) > arm.tolerance:
         # Along the grid the muscles give way by about this much.
         column = DEMAND + LINE * line
@@ -80,36 +74,24 @@ def settle_bundle(arm: Arm, state: State, line: int, x: float, offset: float, fa
             0.0, float(last), arm.tolerance)
         while root.searching(motion, BUNDLE_SEARCH):
             k, share, missing = _lacking_bundle(
-                arm, state, line, point, x, offset, factor, dt, play)
+                arm, state, line, point, x, offset, factor, dt)
             point = root.proceed(motion, BUNDLE_SEARCH, missing)
         if 0.0 < point < last:
             bundle.keep_gain(motion, BUNDLE_SEARCH, point - near, scale, here)
-    bundle.commit(arm.wires, state.memories, state.inputs)
+    bundle.commit(arm.wires, state.memories, state.loads, x)
     return k, share
 
 
 @lean
-def _lacking_kept(arm: Arm, state: State, line: int, x: float, offset: float, factor: float,
-                  dt: float) -> tuple[int, float, float]:
-    """Return where unequal muscles that keep their inputs are, and the load missing there."""
-    for i in range(len(state.inputs)):
-        state.inputs[i] = last_input(arm.wires.table, state.memories[i])
-    output = bundle.mean_output(arm.wires, state.memories) + bundle.mean_offset(arm.wires)
-    k, share = place(arm, state.motion, line, factor * (output - arm.base), offset)
-    load = required(arm, state.motion, line, k, share, dt)
-    return k, share, load - bundle.mean_load(state.inputs, x)
-
-
-@lean
 def _lacking_bundle(arm: Arm, state: State, line: int, point: float, x: float, offset: float,
-                    factor: float, dt: float, play: float) -> tuple[int, float, float]:
+                    factor: float, dt: float) -> tuple[int, float, float]:
     """Return the place at a point of the grid, and the load that is missing there."""
     k = min(int(point), len(arm.grid) - 2) + 1
     share = point - (k - 1)
     output = arm.base + demand_at(arm, line, k, share, offset) / factor
-    load = required(arm, state.motion, line, k, share, dt) - play * width(arm, line, k, share)
-    bundle.inputs_for(arm.wires, state.memories, output, load - x, state.inputs)
-    return k, share, load - bundle.mean_load(state.inputs, x)
+    load = required(arm, state.motion, line, k, share, dt)
+    bundle.loads_for(arm.wires, state.memories, output, load, x, state.loads)
+    return k, share, load - bundle.mean_load(state.loads, x)
 
 
 @lean
@@ -133,7 +115,7 @@ def direction(arm: Arm, state: State, x: float, offset: float, factor: float, dt
         drag = root.proceed(motion, REST_SEARCH, _lacking_held(
             arm, state, k, share, drag, x, offset, factor, dt))
     # The arm stands still, but its load has changed, and with it what the load does.
-    bundle.commit(arm.wires, state.memories, state.inputs)
+    bundle.commit(arm.wires, state.memories, state.loads, x)
     return 0
 
 
@@ -146,11 +128,9 @@ def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: 
     demand += part * (demand_at(arm, edge, k, share, offset) - demand)
     load = required(arm, state.motion, 0, k, share, dt)
     load += part * (required(arm, state.motion, edge, k, share, dt) - load)
-    # An arm that sinks stretches the muscle, which takes up the play first.
-    load -= 0.5 * (1.0 + drag) * width(arm, edge, k, share)
     output = arm.base + demand / factor
-    if len(arm.wires.offsets) > 1:
-        bundle.inputs_for(arm.wires, state.memories, output, load - x, state.inputs)
+    if arm.plays or len(arm.wires.offsets) > 1:
+        bundle.loads_for(arm.wires, state.memories, output, load, x, state.loads)
     else:
-        state.inputs[0] = solve(arm.wires.table, state.memories[0], output)[0]
-    return load - bundle.mean_load(state.inputs, x)
+        state.loads[0] = solve(arm.wires.table, state.memories[0], output)[0]
+    return load - bundle.mean_load(state.loads, x)

@@ -68,14 +68,36 @@ class Arm:
         self.time = 0.0
         self.angle = 2.2
         self.tensions = [5.0] * len(self.muscle.wires)
-        coupled = (conditions.heat.latent or conditions.resistance_growth or conditions.viscous
-                   or conditions.disturbances or conditions.creep)
-        self._settling_dt = SETTLING_DT if coupled else math.inf
+        self._change: Callable[[], object] | None = None
+        self._change_time = math.inf
+        self._adapt()
         if len(self.muscle.wires) == 1:
             self._find = RootFinder(TYPICAL_LEVER, LENGTH_TOLERANCE)
         else:
             self._find = RootFinder(TYPICAL_STIFFNESS, MOMENT_TOLERANCE)
         self.heat_and_cool()
+
+    def _adapt(self) -> None:
+        """Take over from the conditions what is kept elsewhere."""
+        conditions = self.conditions
+        coupled = (conditions.heat.latent or conditions.resistance_growth or conditions.viscous
+                   or conditions.disturbances or conditions.creep)
+        self._settling_dt = SETTLING_DT if coupled else math.inf
+        for wire in self.muscle.wires:
+            wire.compliance = conditions.compliance
+
+    def change_at(self, time: float, change: Callable[[], object]) -> None:
+        """
+        Have the conditions changed while the arm lives.
+
+        Parameters
+        ----------
+        time : float
+            When [s].
+        change : callable
+            Changes `conditions`, but not material and number of the wires.
+        """
+        self._change_time, self._change = time, change
 
     def heat_and_cool(self) -> None:
         """Heat fully, cool, and let the arm hang: how every trial begins. Time stands still."""
@@ -150,6 +172,10 @@ class Arm:
         if dt <= 0.0:
             return
         self.time += dt
+        if self._change is not None and self.time > self._change_time:
+            self._change()
+            self._change = None
+            self._adapt()
         air = conditions.air
         kept = math.exp(-dt / air.turbulence_time)
         self._fluctuation = kept * self._fluctuation + (

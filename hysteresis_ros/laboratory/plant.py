@@ -126,6 +126,8 @@ class Plant:
         About how long a recording on the arm takes [s], for slow and rare effects.
     muscle : str
         Constitutive model of the wires, a key of `MUSCLES`.
+    effects_after : float
+        Time of the arm [s] at which its effects begin; what belongs to the wire cannot then.
 
     Raises
     ------
@@ -136,7 +138,8 @@ class Plant:
 
     def __init__(self, seed: int = 0, effects: Mapping[str, float] | None = None,
                  heat_time_constant: float = PAPER, recording: int = 0,
-                 recording_time: float = 900.0, muscle: str = 'grains') -> None:
+                 recording_time: float = 900.0, muscle: str = 'grains',
+                 effects_after: float = 0.0) -> None:
         if seed < 0 or recording < 0:
             raise ParameterError(f'laboratory: seeds must not be negative, not {seed}, {recording}')
         if not (heat_time_constant > 0.0 and recording_time > 0.0):
@@ -146,11 +149,19 @@ class Plant:
         self.effects = dict(effects or {})
         self.material = specimen(seed, muscle)
         bench = apply_effects(Conditions(material=self.material), self.effects, seed, bench=True)
-        conditions = Conditions(material=self.material, recording_time=recording_time,
-                                heat=HeatBalance(time_constant=heat_time_constant))
-        apply_effects(conditions, self.effects, seed, recording)
+        conditions, changed = (
+            Conditions(material=self.material, recording_time=recording_time,
+                       heat=HeatBalance(time_constant=heat_time_constant)) for _ in range(2))
+        apply_effects(changed, self.effects, seed, recording)
+        if effects_after > 0.0 and (changed.material is not conditions.material
+                                    or changed.wire_offsets != conditions.wire_offsets):
+            raise ParameterError(f'laboratory: one of {", ".join(self.effects)} belongs to the '
+                                 'wires as they were built; it cannot begin while the arm runs')
         self.bench = Bench(bench, seed=[seed, recording, 11])
-        self.arm = Arm(conditions, seed=[seed, recording, 12])
+        self.arm = Arm(conditions if effects_after > 0.0 else changed, seed=[seed, recording, 12])
+        if effects_after > 0.0:
+            self.arm.change_at(effects_after, lambda: apply_effects(
+                conditions, self.effects, seed, recording))
         self._rng = np.random.default_rng([seed, recording, 13])
 
     def force_trial(self, voltages: ArrayLike) -> np.ndarray:
@@ -182,7 +193,7 @@ class Plant:
         rows = []
         for voltage in voltages.tolist():
             self.arm.settle(hold, voltage)
-            rows.append(self._read())
+            rows.append(self.read())
         return self._columns(hold * np.arange(1, len(voltages) + 1), voltages, rows)
 
     def arm_run(self, time: ArrayLike, voltage: ArrayLike) -> dict[str, np.ndarray]:
@@ -208,10 +219,11 @@ class Plant:
         rows = []
         for dt, value in zip(np.diff(time, prepend=0.0).tolist(), voltage.tolist()):
             self.arm.advance(dt, value)
-            rows.append(self._read())
+            rows.append(self.read())
         return self._columns(time, voltage, rows)
 
-    def _read(self) -> tuple[float, float, float]:
+    def read(self) -> tuple[float, float, float]:
+        """Return the angle [rad], the room's temperature [degC] and the supply voltage [V] now."""
         arm = self.arm
         return (sensors.counted_angle(arm.encoder_counts),
                 sensors.thermometer(arm.conditions.air.recorded(arm.time), self._rng),

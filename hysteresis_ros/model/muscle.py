@@ -103,9 +103,12 @@ class MuscleModel:
             length = 20.0 * span
         largest = max(abs(value) for value in self.ranges.get(self.drive, (0.0, 1.0)))
         bare = Chain([], Surroundings(1.0, 1.0, 1.0, 1.0, self.drive))
+        # The force table was measured at the resting length.
+        rest_load = self.force_stage.output_range[0] if self.force_stage is not None else 0.0
+        least = self.length_stage.output_range[0] if self.length_stage is not None else 0.0
         return Surroundings(length, self.mean_load, float(bare.to_drive_squared(largest)), span,
                             self.drive, self.load_name, self.response, self.cold_drive,
-                            self.drive_range, self.sign)
+                            self.drive_range, self.sign, rest_load, least)
 
     def with_effects(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return a copy with other effects and the same operators."""

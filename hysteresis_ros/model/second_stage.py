@@ -4,26 +4,17 @@
 
 from collections.abc import Mapping, Sequence
 import copy
-from typing import Any, NamedTuple
+from typing import Any
+
+import numpy as np
 
 from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.kernels.load_play import held
+from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.operators import HysteresisOperator
 
 # Elongation [m] by which elastic wires may leave the range of the transformation.
 ELASTIC_ROOM = 0.02
-
-
-class Load(NamedTuple):
-    """
-    A load as the transformation feels it.
-
-    `inside` is what the drive is weighed against, and `width` by how much the loop is wider under
-    it than that of H2, both in the unit of the load.
-    """
-
-    inside: float
-    width: float = 0.0
 
 
 class SecondStage:
@@ -38,19 +29,19 @@ class SecondStage:
         The second stage H2; it is copied.
     sign : int
         -1 for muscles that contract when driven, 1 for one that extends.
-    offsets : tuple of float
-        Excess length [m] of each parallel muscle; one entry for equal muscles.
-    compliance : float
-        Elastic compliance of a wire [m/N].
+    chain : Chain
+        Effects of the model: excess lengths of the muscles, and how a wire strains under its load.
+    loaded : bool
+        Whether the load is weighed against x; loads do not count else.
     """
 
-    def __init__(self, operator: HysteresisOperator, sign: int,
-                 offsets: tuple[float, ...], compliance: float) -> None:
-        self._bundle = Bundle(operator, offsets, compliance) if len(offsets) > 1 else None
+    def __init__(self, operator: HysteresisOperator, sign: int, chain: Chain, loaded: bool) -> None:
+        self._chain, self._loaded = chain, loaded
+        self._bundle = Bundle(operator, chain, loaded) if len(chain.offsets) > 1 else None
         self._operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self._sign = sign
         self.base, self._top = operator.output_range
-        self._room = max(abs(excess) for excess in offsets) + ELASTIC_ROOM
+        self._room = max(abs(excess) for excess in chain.offsets) + ELASTIC_ROOM
 
     def reset(self) -> None:
         """Wipe the memory."""
@@ -73,16 +64,14 @@ class SecondStage:
         for operator, entry in zip(self._operators, state, strict=True):
             operator.restore(entry)
 
-    def settle_cold(self, x: float, load: Load, inputs: Sequence[float] | None = None) -> None:
+    def settle_cold(self, x: float, load: float, inputs: Sequence[float] | None = None) -> None:
         """
         Start from the cold state.
 
         Parameters
         ----------
-        x : float
-            Output of the first stage, cold.
-        load : Load
-            That is borne meanwhile.
+        x, load : float
+            Output of the first stage, and load that is borne, both cold.
         inputs : sequence of float, optional
             What each muscle starts from, where that is known better.
         """
@@ -95,31 +84,33 @@ class SecondStage:
         outputs = [operator.output for operator in self._operators]
         return sum(outputs) / len(outputs)
 
-    def drive(self, output: float, load: Load, dead_band: float = 0.0) -> tuple[float, bool]:
+    def drive(self, output: float, load: float, dead_band: float = 0.0) -> tuple[float, bool]:
         """Return x for an output [m] under a load, and whether that output is out of reach."""
+        inside, width = self._felt(load)
         if self._bundle is not None:
-            cooling = output > self.output
-            return self._bundle.drive(output, load.inside - cooling * load.width), False
+            return self._bundle.drive(output, inside), False
         operator = self._operators[0]
         found = operator.invert(output, dead_band=dead_band)
-        play = load.width if found.input > operator.input else 0.0
-        return self._sign * found.input + load.inside - play, found.saturated
+        play = width if found.input > operator.input else 0.0
+        return self._sign * found.input + inside - play, found.saturated
 
-    def respond(self, x: float, load: Load) -> tuple[float, list[float]]:
+    def respond(self, x: float, load: float) -> tuple[float, list[float]]:
         """Return the output [m] and the inputs that `step` would commit."""
-        if self._bundle is None:
-            u = self._sign * (x - load.inside)
-            if load.width > 0.0:
-                u = held(self._operators[0].input, u, load.width)
-            return self._operators[0].peek(u), [u]
-        limits = self.base - self._room, self._top + self._room, self.base
-        heated = self._bundle.respond(x, load.inside, *limits)
-        if load.width == 0.0 or heated[0] <= self.output:
-            return heated
-        cooled = self._bundle.respond(x, load.inside - load.width, *limits)
-        if cooled[0] >= self.output:
-            return cooled
-        return self.output, [operator.input for operator in self._operators]
+        inside, width = self._felt(load)
+        if self._bundle is not None:
+            return self._bundle.respond(
+                x, inside, self.base - self._room, self._top + self._room, self.base)
+        u = self._sign * (x - inside)
+        if width > 0.0:
+            u = held(self._operators[0].input, u, width)
+        return self._operators[0].peek(u), [u]
+
+    def _felt(self, load: float) -> tuple[float, float]:
+        """Return a load as the transformation feels it, and by how much it widens the loop."""
+        if not self._loaded:
+            return 0.0, 0.0
+        felt = np.float64(load)
+        return float(self._chain.load_inside(felt)), float(self._chain.loop_width(felt))
 
     def step(self, inputs: Sequence[float]) -> None:
         """Commit each muscle's input."""

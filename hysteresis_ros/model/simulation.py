@@ -129,8 +129,10 @@ class Simulator:
         self.trials = trials_of(model, measurement)
         self._surroundings = model.surroundings
         self._balances: dict[tuple, ArmBalance] = {}
-        # The martensite share of every row in the latest run of a set of effects, by their names.
+        # The martensite share of every row in the latest run of a set of effects, by their names,
+        # and in the latest of all.
         self._phases: dict[tuple[str, ...], np.ndarray] = {}
+        self._latest = np.ones(measurement.rows)
         self._statics = None
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
@@ -165,7 +167,7 @@ class Simulator:
 
     def _keep(self, effects: Sequence[Effect], phase: np.ndarray | None) -> None:
         if phase is not None:
-            self._phases[tuple(effect.id for effect in effects)] = phase
+            self._phases[tuple(effect.id for effect in effects)] = self._latest = phase
 
     def _run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None,
              exact: bool = False) -> tuple[np.ndarray, np.ndarray | None]:
@@ -175,9 +177,8 @@ class Simulator:
         result = np.empty(self.measurement.rows)
         phase = None
         if chain.needs_phase:
-            known = self._phases.get(tuple(effect.id for effect in effects))
-            phase = (np.ones(self.measurement.rows) if exact or known is None
-                     else known.copy())
+            known = self._phases.get(tuple(effect.id for effect in effects), self._latest)
+            phase = np.ones_like(known) if exact else known.copy()
         for trial in self.trials:
             if phase is not None:
                 response, phase[trial.rows], agrees = self._agree(

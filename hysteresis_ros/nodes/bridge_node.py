@@ -11,6 +11,10 @@ the reading thread at once.
 The output goes to zero when no setpoint came for ``setpoint_timeout``, when the board is silent
 for ``telemetry_timeout``, and first of all when the node ends. A setpoint that is no number or out
 of the limits never reaches the board and does not renew the one before.
+
+It is a managed node. Inactive, it keeps the port open and the clock going, with the output off, and
+publishes and follows nothing; unconfigured, it has no port. After it was deactivated the output
+stays off until ``~/enable``.
 """
 
 from __future__ import annotations
@@ -23,7 +27,6 @@ from typing import Any, TYPE_CHECKING
 from builtin_interfaces.msg import Time
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState, Temperature
@@ -37,6 +40,7 @@ from hysteresis_ros.errors import BoardError, RangeError
 from hysteresis_ros.nodes.bridge_parameters import (
     check, make_cycle, make_encoder, make_pwm, PARAMETERS)
 from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, OK, WARN
+from hysteresis_ros.nodes.lifecycle import ManagedNode
 from hysteresis_ros.nodes.parameters import Parameters
 from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
 from hysteresis_ros.nodes.running import run
@@ -50,7 +54,7 @@ ENABLE_PATIENCE = 3.0       # s of the wall that ~/enable waits for the board to
 BAD_LINES_SHOWN_FOR = 5.0   # s of the wall after the latest bad line
 
 
-class BridgeNode(Node):
+class BridgeNode(ManagedNode):
     """
     The node `hardware_bridge`.
 
@@ -66,13 +70,8 @@ class BridgeNode(Node):
         super().__init__('hardware_bridge', **options)
         self._settings = parameters = Parameters(
             self, self.PARAMETERS, check=check, changed=self._configure)
-        self._board = Board(
-            parameters['port'], parameters['baud'], make_pwm(parameters), make_encoder(parameters),
-            Timeouts(setpoint=parameters['setpoint_timeout'],
-                     telemetry=parameters['telemetry_timeout'],
-                     watchdog=parameters['board_watchdog']),
-            1.0 / parameters['telemetry_rate'], parameters['supply_voltage'],
-            parameters['supply_tolerance'], self._on_sample)
+        self._board: Board | None = None     # only where it is configured
+        self._works = False                 # for the reading thread: whether the node is active
         self._lock = threading.Lock()   # of what callbacks and the reading thread share:
         # The heat and cool cycle that is running, and its end: (success, message).
         self._cycle: HeatAndCool | None = None
@@ -97,30 +96,79 @@ class BridgeNode(Node):
         self.create_service(SetBool, '~/enable', self._on_enable, callback_group=waiting)
         self.create_service(Trigger, '~/initialise', self._on_initialise, callback_group=waiting)
         self.create_timer(LOOK_PERIOD, self._look, clock=self._wall)
-        self._board.enable(self._wanted)
+        if parameters['autostart']:
+            self.start()
+
+    def set_up(self) -> None:
+        """Open the port, and go on trying to; the output is off."""
+        parameters = self._settings
+        self._board = Board(
+            parameters['port'], parameters['baud'], make_pwm(parameters), make_encoder(parameters),
+            Timeouts(setpoint=parameters['setpoint_timeout'],
+                     telemetry=parameters['telemetry_timeout'],
+                     watchdog=parameters['board_watchdog']),
+            1.0 / parameters['telemetry_rate'], parameters['supply_voltage'],
+            parameters['supply_tolerance'], self._on_sample)
         self._board.start()
 
-    def on_shutdown(self) -> None:
-        """Write zero to the board, before anything else ends."""
-        self._board.stop()
+    def activate(self) -> None:
+        """Publish, and follow setpoints where the output is enabled."""
+        self._the_board().enable(self._wanted)
+        self._works = True
+
+    def deactivate(self) -> None:
+        """Switch the muscle off; only ``~/enable`` switches it on again."""
+        self._stand_still('the node was deactivated')
+        if not self._the_board().switch_off():
+            self.get_logger().warning('the board has not said that its output is off; its '
+                                      'watchdog switches off now that no setpoint comes')
+
+    def clean_up(self) -> None:
+        """Write zero to the board and close the port."""
+        self._stand_still('the node was shut down')
+        if self._board is not None:
+            self._board.stop()
+        waiting, self._waiting = self._waiting, []
+        for _, future, _ in waiting:
+            future.set_result(False)
+        self._board = self._stamps = None
 
     def destroy_node(self) -> None:
         """Stop the board, whose thread publishes, before the publishers go."""
-        self._board.stop()
+        self.clean_up()
         super().destroy_node()
 
+    def _stand_still(self, reason: str) -> None:
+        """Publish and follow nothing any more, and give up a heat and cool cycle."""
+        if self._works:
+            self._wanted = False
+        self._works = False
+        with self._lock:
+            if self._cycle is not None:
+                self._end_cycle(False, f'heat and cool cycle: {reason}')
+
+    def _the_board(self) -> Board:
+        """Return the board; BoardError where the node is not configured."""
+        if self._board is None:
+            raise BoardError(f'the node is {self.state}: it has no board')
+        return self._board
+
     def _configure(self, parameters: Parameters) -> None:
-        self._board.pwm = make_pwm(parameters)
+        if self._board is not None:
+            self._board.pwm = make_pwm(parameters)
 
     # Setpoints and services
 
     def _on_setpoint(self, message: Float64) -> None:
+        board = self._board
+        if board is None or not self._works:
+            return
         try:
             with self._lock:
                 if self._cycle is not None:
                     raise RangeError(f'voltage setpoint {message.data:g} V refused: the heat and '
                                      'cool cycle is running')
-                self._board.set_voltage(message.data)
+                board.set_voltage(message.data)
         except RangeError as error:
             self._refused += 1
             self._diagnostics.set('setpoint', WARN, str(error))
@@ -130,15 +178,21 @@ class BridgeNode(Node):
 
     async def _on_enable(self, request: SetBool.Request,
                          response: SetBool.Response) -> SetBool.Response:
-        wanted = request.data
-        status = self._board.status
+        wanted, board = request.data, self._board
+        if board is None or not self._works:
+            # What is off already stays off.
+            response.success = not wanted
+            response.message = ('disabled' if not wanted else
+                                f'not enabled: the node is {self.state}; activate it first')
+            return response
+        status = board.status
         if wanted and not status.online:
             response.message = f'not enabled: {status.problem or "there is no board yet"}'
             return response
         self._wanted = wanted
-        self._board.enable(wanted)
+        board.enable(wanted)
         if wanted:
-            self._board.clear_fault()
+            board.clear_fault()
         if not status.online:
             response.success = True
             response.message = 'disabled; the board is not there, and will stay off'
@@ -147,11 +201,14 @@ class BridgeNode(Node):
             lambda status: enabled(status) == wanted, ENABLE_PATIENCE)
         response.message = 'enabled' if wanted else 'disabled'
         if not response.success:
-            response.message = f'the board did not follow: {self._board.status.problem}'
+            response.message = f'the board did not follow: {board.status.problem}'
         return response
 
     async def _on_initialise(self, request: Trigger.Request,
                              response: Trigger.Response) -> Trigger.Response:
+        if self._board is None or not self._works:
+            response.message = f'not begun: the node is {self.state}; activate it first'
+            return response
         status = self._board.status
         if not enabled(status):
             response.message = f'not begun: {status.problem or "the output is not enabled"}'
@@ -180,9 +237,12 @@ class BridgeNode(Node):
     # What the board says, in its reading thread
 
     def _on_sample(self, sample: Sample) -> None:
-        if not self.context.ok():
+        board = self._board
+        if board is None or not self.context.ok():
             return
-        stamp = self._stamp(sample)
+        stamp = self._stamp(board.speed, sample)
+        if not self._works:
+            return
         self._voltages.publish(Float64(data=sample.voltage))
         if sample.fresh:
             message = JointState(name=[self._settings['joint_name']], position=[sample.angle],
@@ -195,10 +255,9 @@ class BridgeNode(Node):
             self._ambients.publish(message)
         with self._lock:
             if self._cycle is not None:
-                self._heat_and_cool(self._cycle, sample)
+                self._heat_and_cool(board, self._cycle, sample)
 
-    def _stamp(self, sample: Sample) -> Time:
-        speed = self._board.speed
+    def _stamp(self, speed: float, sample: Sample) -> Time:
         now = 1e-9 * self.get_clock().now().nanoseconds
         if speed == 1.0:
             if self._stamps is None:
@@ -212,7 +271,7 @@ class BridgeNode(Node):
                 self._clocks.publish(ClockMessage(clock=stamp))
         return stamp
 
-    def _heat_and_cool(self, cycle: HeatAndCool, sample: Sample) -> None:
+    def _heat_and_cool(self, board: Board, cycle: HeatAndCool, sample: Sample) -> None:
         try:
             if not sample.enabled:
                 raise BoardError('heat and cool cycle: the output was switched off meanwhile')
@@ -224,12 +283,13 @@ class BridgeNode(Node):
         if phase.done:
             self._end_cycle(True, 'heated and cooled: the memory is wiped')
         elif phase.voltage > 0.0:
-            self._board.set_voltage(phase.voltage)
+            board.set_voltage(phase.voltage)
         else:
-            self._board.set_zero()
+            board.set_zero()
 
     def _end_cycle(self, success: bool, message: str) -> None:
-        self._board.set_zero()
+        if self._board is not None:
+            self._board.set_zero()
         self._cycle = None
         self._outcome = success, message
 
@@ -237,6 +297,12 @@ class BridgeNode(Node):
 
     def _look(self) -> None:
         if not self.context.ok():
+            return
+        self._tell('lifecycle', OK, '' if self._works else f'the node is {self.state}')
+        if self._board is None:
+            for name in ('board', 'faults', 'supply', 'timeout', 'encoder', 'output', 'initialise',
+                         'lines'):
+                self._diagnostics.clear(name)
             return
         status = self._board.status
         self._keep_clock(status)
@@ -302,15 +368,19 @@ class BridgeNode(Node):
             self._diagnostics.clear(name)
 
     def _values(self) -> dict[str, Any]:
-        status = self._board.status
-        values = {
+        values: dict[str, Any] = {
             'state': 'initialising' if self._cycle is not None else 'ready',
+            'lifecycle': self.state}
+        if self._board is None:
+            return values
+        status = self._board.status
+        values.update({
             'port': self._settings['port'], 'online': status.online,
             'board': status.identity.name if status.identity else 'unknown',
             'connections': status.connections, 'frames': status.frames,
             'bad lines': status.bad_lines, 'lost frames': status.lost_frames,
             'latest refusal of the board': status.refusal or 'none',
-            'setpoints taken': self._taken, 'setpoints refused': self._refused}
+            'setpoints taken': self._taken, 'setpoints refused': self._refused})
         sample = status.sample
         if sample is not None:
             values.update({

@@ -10,6 +10,7 @@ from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.heat_and_cool import HeatAndCool
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.nodes.lifecycle import LIFECYCLE
 from hysteresis_ros.nodes.parameters import NAMES, Spec, VOLTAGE_LIMITS
 
 BOARD = (
@@ -60,7 +61,7 @@ INITIALISATION = (
     Spec('initialise_cool_time', 60.0, 'Shortest cooling time of ~/initialise', 's', 1.0, 3600.0),
 )
 
-PARAMETERS = BOARD + OUTPUT + ENCODER + INITIALISATION + VOLTAGE_LIMITS + NAMES
+PARAMETERS = BOARD + OUTPUT + ENCODER + INITIALISATION + VOLTAGE_LIMITS + NAMES + LIFECYCLE
 
 
 def make_pwm(values: Mapping[str, Any]) -> Pwm:

@@ -14,6 +14,9 @@ nothing warms the muscle again between the cycle's end and the next reference.
 
 A reference that names the muscle and gives no numbers lets it go: the setpoint is zero once, and
 nothing is repeated until the next reference.
+
+It is a managed node: configuring loads the model; deactivating lets the muscle go, and references
+count again from when the node is active.
 """
 
 from __future__ import annotations
@@ -23,7 +26,6 @@ import math
 from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.node import Node
 from sensor_msgs.msg import JointState, Temperature
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -31,8 +33,9 @@ from std_srvs.srv import Trigger
 from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
 from hysteresis_ros.errors import HysteresisError, ParameterError, RangeError
 from hysteresis_ros.kernels.warm_up import warm_up_controller
-from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, WARN
+from hysteresis_ros.nodes.diagnostics import Diagnostics, ERROR, OK, WARN
 from hysteresis_ros.nodes.feedback import AngleFeedback
+from hysteresis_ros.nodes.lifecycle import LIFECYCLE, ManagedNode
 from hysteresis_ros.nodes.parameters import (
     check_limits, GEOMETRY, MODEL, NAMES, Parameters, Spec, TARGETS, VOLTAGE_LIMITS)
 from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
@@ -70,7 +73,7 @@ COMPENSATION = (
 )
 
 
-class CompensatorNode(Node):
+class CompensatorNode(ManagedNode):
     """
     The node `hysteresis_compensator`.
 
@@ -82,45 +85,101 @@ class CompensatorNode(Node):
         For `rclpy.node.Node`, such as ``namespace`` or ``parameter_overrides``.
     """
 
-    PARAMETERS = MODEL + VOLTAGE_LIMITS + COMPENSATION + TARGETS + GEOMETRY + NAMES
+    PARAMETERS = MODEL + VOLTAGE_LIMITS + COMPENSATION + TARGETS + GEOMETRY + NAMES + LIFECYCLE
 
     def __init__(self, model: MuscleModel | None = None, **options: Any) -> None:
         super().__init__('hysteresis_compensator', **options)
-        parameters = Parameters(
+        self._settings = parameters = Parameters(
             self, self.PARAMETERS, check=_check, changed=self._configure)
-        self._model = model or load_model(
-            parameters['model_file'], parameters, self.get_logger())
-        # Before anything is subscribed: the first reference must not wait for a compiler.
-        self._ready_after = warm_up_controller(self._model)
-        self.get_logger().info(f'kernels ready in {self._ready_after:.1f} s')
-        self._controller = self._model.controller(
-            arm=True, lag_margin=parameters['lag_margin'])
+        self._given = model
+        # Both only where the node is configured.
+        self._model: MuscleModel | None = None
+        self._controller: Any = None
         self._integral = AngleFeedback()
-        self._timer = None
+        self._timer: Any = None
+        self._ambients: Any = None
+        self._works = False
         self._silent = True
-        self._ambient = math.nan
+        self._ambient = self._ready_after = math.nan
         self._received = self._published = self._refused = self._repeated = 0
         self._corrections = 0
         self._forget()
         self._publisher = self.create_publisher(Float64, 'voltage_setpoint', COMMANDS)
         self._diagnostics = Diagnostics(
             self, parameters['hardware_id'], self._counts, 'compensating')
-        self._configure(parameters)
+        self._bridge = f"{self.get_namespace().strip('/')}/hardware_bridge".lstrip('/')
+        self._initialising = False
+        if parameters['autostart']:
+            self.start()
+        else:
+            self._tell_state('unconfigured')
         self.create_subscription(JointState, 'muscle_reference', self._on_reference, COMMANDS)
         if parameters['feedback']:
             self.create_subscription(
                 JointState, 'joint_states', self._on_joint_states, MEASUREMENTS)
-        if needs_ambient(self._model):
-            self.create_subscription(
-                Temperature, 'ambient_temperature', self._on_ambient, MEASUREMENTS)
-        self._bridge = f"{self.get_namespace().strip('/')}/hardware_bridge".lstrip('/')
-        self._initialising = False
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self.create_service(Trigger, '~/reset', self._on_reset)
+
+    def set_up(self) -> None:
+        """Load the model and compile what runs on it."""
+        parameters = self._settings
+        self._model = self._given or load_model(
+            parameters['model_file'], parameters, self.get_logger())
+        # Before anything is followed: the first reference must not wait for a compiler.
+        self._ready_after = warm_up_controller(self._model)
+        self.get_logger().info(f'kernels ready in {self._ready_after:.1f} s')
+        self._controller = self._model.controller(
+            arm=True, lag_margin=parameters['lag_margin'])
+        if needs_ambient(self._model):
+            self._ambients = self.create_subscription(
+                Temperature, 'ambient_temperature', self._on_ambient, MEASUREMENTS)
+        self._configure(parameters)
+        self._tell_state('inactive')
+
+    def activate(self) -> None:
+        """Follow references from now on."""
+        self._works = True
+        self._tell_state('')
+
+    def deactivate(self) -> None:
+        """Let the muscle go, and follow nothing."""
+        self._let_go()
+        self._works = False
+        self._tell_state('inactive')
+
+    def clean_up(self) -> None:
+        """Forget the model."""
+        if self._works and self.context.ok():
+            self._let_go()
+        self._works = False
+        self._repeat_every(0.0)
+        if self._ambients is not None:
+            self.destroy_subscription(self._ambients)
+            self._ambients = None
+        self._model = self._controller = None
+        self._tell_state('unconfigured')
+
+    def _tell_state(self, state: str) -> None:
+        if not self.context.ok():
+            return
+        if state:
+            self._diagnostics.set('lifecycle', OK, f'the node is {state}')
+        else:
+            self._diagnostics.clear('lifecycle')
+
+    def _repeat_every(self, period: float) -> None:
+        """Look for silence twice in a period [s]; 0 for never."""
+        if self._timer is not None:
+            self.destroy_timer(self._timer)
+            self._timer = None
+        if period > 0.0:
+            self._timer = self.create_timer(0.5 * period, self._repeat)
 
     def _configure(self, parameters: Parameters) -> None:
         self._muscle, self._joint = parameters['muscle_name'], parameters['joint_name']
         self._feedback = parameters['feedback']
+        if self._model is None:
+            return
         self._geometry = BicepGeometry.from_mapping(parameters)
         self._arm = ArmReference(self._geometry, self._model, parameters['target_dead_band'])
         self._controller.limits = parameters['minimum_voltage'], parameters['maximum_voltage']
@@ -131,11 +190,7 @@ class CompensatorNode(Node):
         self._controller.horizon = (parameters['horizon'] if repeated else 0.0) or math.inf
         self._integral.configure(*(parameters[f'feedback_{name}'] for name in (
             'gain', 'limit', 'rest_speed', 'dead_band', 'period', 'delay')))
-        if self._timer is not None:
-            self.destroy_timer(self._timer)
-            self._timer = None
-        if repeated:
-            self._timer = self.create_timer(0.5 * parameters['republish_period'], self._repeat)
+        self._repeat_every(parameters['republish_period'])
 
     def _forget(self) -> None:
         self._wanted: Reference | None = None
@@ -147,6 +202,8 @@ class CompensatorNode(Node):
         return 1e-9 * self.get_clock().now().nanoseconds
 
     def _on_reference(self, message: JointState) -> None:
+        if not self._works:
+            return
         self._received += 1
         if lets_go(message, self._muscle):
             self._let_go()
@@ -210,7 +267,7 @@ class CompensatorNode(Node):
 
     def _repeat(self) -> None:
         """Publish when there was silence since the last look, half a period ago."""
-        if self._silent and self._wanted is not None:
+        if self._works and self._silent and self._wanted is not None:
             self._publish(self._controller.hold(self._now(), self._ambient))
             self._repeated += 1
         else:
@@ -218,7 +275,7 @@ class CompensatorNode(Node):
 
     def _on_joint_states(self, message: JointState) -> None:
         angle = read_angle(message, self._joint)
-        if self._wanted is None or angle is None:
+        if not self._works or self._wanted is None or angle is None:
             return
         before = self._integral.correction
         correction = self._integral.update(
@@ -241,7 +298,8 @@ class CompensatorNode(Node):
             self._initialising = state == 'initialising'
 
     def _reset(self) -> None:
-        self._controller.reset()
+        if self._controller is not None:
+            self._controller.reset()
         self._forget()
         self._diagnostics.clear('saturated')
 
@@ -253,7 +311,8 @@ class CompensatorNode(Node):
         return response
 
     def _counts(self) -> dict[str, Any]:
-        return {'references received': self._received, 'setpoints published': self._published,
+        return {'lifecycle': self.state, 'references received': self._received,
+                'setpoints published': self._published,
                 'references refused': self._refused, 'setpoints repeated': self._repeated,
                 'feedback corrections': self._corrections,
                 'feedback correction [rad]': self._integral.correction,

@@ -63,6 +63,7 @@ def run(make_node: Callable, args: Sequence[str] | None = None) -> int:
     except (HysteresisError, OSError) as error:
         status = _fail(error)
     finally:
+        ending.call(None)
         status = _end(node) or status
         # Python puts the default handlers back on its way out: a signal then would be the status.
         for number in ENDING:
@@ -82,6 +83,7 @@ class Ending:
     def __init__(self) -> None:
         self.has_come = False
         self._wake: Callable[[], object] | None = None
+        self._lock = threading.Lock()   # what is woken must not go while it is being woken
         self._heard, self._signalled = socket.socketpair()
         self._signalled.setblocking(False)
         for number in ENDING:
@@ -90,15 +92,17 @@ class Ending:
         signal.set_wakeup_fd(self._signalled.fileno(), warn_on_full_buffer=False)
         threading.Thread(target=self._listen, daemon=True).start()
 
-    def call(self, wake: Callable) -> None:
+    def call(self, wake: Callable | None) -> None:
         """Have `wake`, which takes nothing, called from another thread when the end comes."""
-        self._wake = wake
+        with self._lock:
+            self._wake = wake
 
     def _listen(self) -> None:
         self._heard.recv(1)
         self.has_come = True
-        if self._wake is not None:
-            self._wake()
+        with self._lock:
+            if self._wake is not None:
+                self._wake()
 
 
 def _start_rclpy(args: Sequence[str] | None) -> None:

@@ -10,7 +10,6 @@ them is the whole memory, and a step costs amortised constant time however long 
 The steps themselves are compiled: `kernels.preisach`.
 """
 
-import copy
 from typing import Any, Mapping
 
 import numpy as np
@@ -71,18 +70,17 @@ class Preisach(CompiledOperator):
         self.lower, self.upper = float(self.nodes[0]), float(self.nodes[-1])
         self._sign = one_sign(
             np.concatenate((self.weights, self.reversible)), 'Preisach weights')
-        self._tilted: dict[float, np.ndarray] = {}
-        self.table = self._packed(self.reversible)
+        self.table = self._packed()
         self.memory = np.empty(kernel.memory_size(MOST_CORNERS))
         self.reset()
         for array in (self.nodes, self.weights, self.reversible):
             array.flags.writeable = False
 
-    def _packed(self, reversible: np.ndarray) -> np.ndarray:
-        """Return the table of parameters with given weights on the diagonal."""
+    def _packed(self) -> np.ndarray:
+        """Return the table of parameters."""
         # The output is base + sign * z with z from 0, all relays down, to span, all up.
         everett, span = everett_table(
-            self.nodes, 2.0 * np.abs(self.weights), 2.0 * np.abs(reversible))
+            self.nodes, 2.0 * np.abs(self.weights), 2.0 * np.abs(self.reversible))
         base = self.bias - self._sign * span / 2.0
         if not span + abs(base) <= LARGEST:
             raise ParameterError(
@@ -93,30 +91,6 @@ class Preisach(CompiledOperator):
             [layout.PREISACH, self.lower, self.upper, self._sign, low, high,
              resolution((low, high)), levels, base, span, levels / (self.upper - self.lower)],
             everett))
-
-    def tilted(self, slope: float) -> 'Preisach':
-        """
-        Return the operator, its memory wiped, plus a line that is 0 in the middle of its range.
-
-        Parameters
-        ----------
-        slope : float
-            Not negative: how much steeper, in the direction of the weights. Unit of the output
-            over the unit of the input.
-
-        """
-        other = copy.deepcopy(self)
-        other.reversible = self.reversible + 0.5 * self._sign * slope
-        other.reversible.flags.writeable = False
-        table = self._tilted.get(slope)
-        if table is None:
-            # The table costs as much as hundreds of steps, and the slope seldom changes.
-            table = self._packed(other.reversible)
-            self._tilted.clear()
-            self._tilted[slope] = table
-        other.table, other._tilted = table, {}
-        other.reset()
-        return other
 
     def _used(self) -> int:
         return kernel.CORNERS + 2 * int(self.memory[kernel.COUNT])

@@ -106,11 +106,30 @@ def chosen_rows(comparison: Comparison, curves: Sequence[Curve],
     ndarray of int
         Extremes of the measured response and of each residual, and both ends of each trial.
     """
-    rows = comparison.rows
+    return extremes([comparison.measured, *(comparison.measured - curve.values
+                                            for curve in curves)], comparison.trial, most)
+
+
+def extremes(series: Sequence[np.ndarray], trial: np.ndarray, most: int) -> np.ndarray:
+    """
+    Choose rows that show the extremes of some series, in order; all, if they are not many.
+
+    Parameters
+    ----------
+    series : sequence of ndarray, each (rows,)
+    trial : ndarray of int, shape (rows,)
+        Both ends of each trial are chosen, too.
+    most : int
+        About how many.
+
+    Returns
+    -------
+    ndarray of int
+    """
+    rows = len(trial)
     if rows <= most:
         return np.arange(rows)
-    series = [comparison.measured, *(comparison.measured - curve.values for curve in curves)]
-    starts = np.flatnonzero(np.diff(comparison.trial, prepend=-1))
+    starts = np.flatnonzero(np.diff(trial, prepend=-1))
     found = [starts, np.append(starts[1:], rows) - 1]
     size = -(-rows // max(most // (2 * len(series)), 1))
     edges = np.arange(0, rows, size)

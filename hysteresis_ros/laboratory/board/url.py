@@ -11,6 +11,7 @@ seed            which specimen of arm and wire, and all that is random (0)
 muscle          constitutive model of the wires: grains, brinson or lagoudas (grains)
 recording       which recording on that specimen: another one has other noise (0)
 recording_time  how long it takes, about, in s, for effects that are slow or rare (900)
+effects_after   time in s at which the effects begin (0: from the start)
 time_constant   of the wires' heating and cooling in s (0.05 to 100; 5 as in the paper)
 supply          supply voltage in V (1 to 60; 12)
 drop            share of bytes lost in each direction (0 to 0.5; 0)
@@ -42,7 +43,8 @@ ARM = 'bicep'
 
 _RANGES = {
     'speed': (0.01, 1000.0), 'seed': (0, 2 ** 31 - 1), 'recording': (0, 2 ** 31 - 1),
-    'recording_time': (1.0, 1e7), 'time_constant': (0.05, 100.0), 'supply': (1.0, 60.0),
+    'recording_time': (1.0, 1e7), 'effects_after': (0.0, math.inf),
+    'time_constant': (0.05, 100.0), 'supply': (1.0, 60.0),
     'drop': (0.0, 0.5), 'garbage': (0.0, 1.0), 'brownout': (0.0, math.inf),
     'unplug_after': (0.0, math.inf), 'unplug_for': (0.0, math.inf),
     'silent_after': (0.0, math.inf), 'silent_for': (0.0, math.inf),
@@ -71,6 +73,7 @@ class Simulation:
     deaf_for: float = math.inf
     effects: dict = dataclasses.field(default_factory=dict)
     muscle: str = 'grains'
+    effects_after: float = 0.0
 
 
 def parse_url(url: str) -> Simulation:
@@ -134,7 +137,8 @@ def make_plant(simulation: Simulation) -> Plant:
 
     """
     return Plant(simulation.seed, simulation.effects, simulation.time_constant,
-                 simulation.recording, simulation.recording_time, simulation.muscle)
+                 simulation.recording, simulation.recording_time, simulation.muscle,
+                 simulation.effects_after)
 
 
 def check_url(url: str) -> None:
