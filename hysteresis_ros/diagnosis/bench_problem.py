@@ -186,6 +186,7 @@ class BenchProblem(Problem):
 
     def _forget(self) -> None:
         """Begin without anything that was computed before."""
+        self._holding_out: BenchProblem | None = None
         self._passive: dict[bytes | None, np.ndarray] = {}
         self._courses: dict[tuple, Course] = {}
         self._excitations: dict[tuple, Excitation] = {}
@@ -202,10 +203,12 @@ class BenchProblem(Problem):
 
     def holding_out(self) -> BenchProblem:
         """Return the same rows and grid, with weights regularised as for rows held out."""
-        other = copy.copy(self)
-        other._strength = HELD_OUT_STRENGTH
-        other._forget()
-        return other
+        if self._holding_out is None:
+            other = copy.copy(self)
+            other._strength = HELD_OUT_STRENGTH
+            other._forget()
+            self._holding_out = other
+        return self._holding_out
 
     @functools.cached_property
     def loads_return(self) -> bool:
@@ -401,10 +404,9 @@ class BenchProblem(Problem):
         return found
 
     def _penalty(self, nodes: np.ndarray) -> np.ndarray:
-        """Square of the penalty; it is the same for all grids of equal intervals."""
+        """Return the square of the penalty, shape (K + 1, K + 1)."""
         if self._square is None:
-            root = smoothness(nodes, reversible=True)
-            self._square = np.pad(self._strength * root.T @ root, (0, 1))
+            self._square = self._strength * _square(len(nodes) - 1)
         return self._square
 
     def _sensed(self, effect: SensorEffect, response: np.ndarray) -> np.ndarray:
@@ -439,6 +441,13 @@ class BenchProblem(Problem):
         metrics['length'] = {**metrics.get('length', {}), **left_out(fit, self.trial)}
         return dataclasses.replace(
             self.model, effects=list(effects), length_stage=stage, metrics=metrics)
+
+
+@functools.lru_cache(maxsize=4)
+def _square(levels: int) -> np.ndarray:
+    """Return the square of the penalty's root; it is the same for all grids of equal intervals."""
+    root = smoothness(np.linspace(0.0, 1.0, levels + 1), reversible=True)
+    return np.pad(root.T @ root, (0, 1))
 
 
 def _remember(found: dict[tuple, Entry], key: tuple, value: Entry) -> None:
