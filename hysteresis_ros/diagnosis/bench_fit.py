@@ -159,13 +159,25 @@ class BenchFitter:
         """
         starts = starts_of(effect, self.problem.kind, self.problem.measured)
         others = [*unaffected(self.fixed, [*known, starts[0]]), *known]
-        errors = [self.error(self.problem.simulate([*others, start])) ** 2 for start in starts]
+        followed = self._worth_following(
+            [[*others, start] for start in starts], 1 if known else FOLLOWED_STARTS)
+        return self.best_of([[*known, starts[index]] for index in followed])
+
+    def begin(self, starts: Sequence[Sequence[Effect]]) -> Fit:
+        """Follow the best of several starts, each a list of effects, for a few steps."""
+        tried = [[*unaffected(self.fixed, effects), *effects] for effects in starts]
+        return min((self.fit(starts[index], FIRST_EVALUATIONS)
+                    for index in self._worth_following(tried, FOLLOWED_STARTS)),
+                   key=lambda fit: self.error(fit.predicted))
+
+    def _worth_following(self, sets: Sequence[Sequence[Effect]], most: int) -> list[int]:
+        """Return which sets of all effects of the model begin with the least errors."""
+        errors = [self.error(self.problem.simulate(effects)) ** 2 for effects in sets]
         # Starts without any effect, such as stops out of reach, all have the same error.
         spread = max(float(np.var(self.problem.measured)), 1e-300)
         _, order = np.unique(np.round(np.array(errors) / spread, SAME), return_index=True)
-        followed = [starts[index] for index in order[:1 if known else FOLLOWED_STARTS]
-                    if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
-        return self.best_of([[*known, start] for start in followed])
+        return [int(index) for index in order[:most]
+                if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
 
     def best_of(self, starts: Sequence[Sequence[Effect]]) -> Fit:
         """Follow several starts, each a list of effects, for a few steps, and fit the best."""

@@ -10,7 +10,7 @@ nor its weights have seen takes the evidence's place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from hysteresis_ros.diagnosis.extend import undetermined
 from hysteresis_ros.diagnosis.observable import observable, present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.effects import catalogue, Effect
+from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.workers import delayed, in_parallel
 
 if TYPE_CHECKING:
@@ -35,8 +36,10 @@ SIGNIFICANCE = 0.05
 CONSISTENT = 0.55
 # Share of the response's range below which an error does not matter.
 SMALL_ERROR = 0.01
-# Sets of each size that are grown by one more effect, and that are judged on held-out rows.
-GROWN, JUDGED = 3, 3
+# Sets of each size that are grown by one more effect, and judged on held-out rows.
+GROWN = 3
+# Share by which an effect has to lower the error of the rows that its set is fitted to.
+WORTH_JUDGING = 0.01
 # Share of the loads on which an effect has to be named again with that load left out.
 NAMED_AGAIN = 0.5
 
@@ -119,19 +122,39 @@ class BenchSelection:
         singles = self._in_parallel(_alone, self._search, self.names)
         found = list(singles)
         single = {fit.names[0]: fit.effects[0] for fit in singles}
-        generation = list(singles)
+        generation = self._best(singles, GROWN)
+        errors = {frozenset(fit.names): self._fitted_error(fit) for fit in singles}
         for _ in range(1, self.settings.most_on_bench):
-            generation.sort(key=lambda fit: self._search.error(fit.predicted))
-            seeds = [fit for number, fit in enumerate(generation) if number < GROWN
-                     or all(effect.universal for effect in fit.effects)]
-            larger = {frozenset((*fit.names, name)): [*fit.effects, effect] for fit in seeds
-                      for name, effect in single.items() if name not in fit.names}
-            generation = self._in_parallel(_together, self._search, [
+            larger = {frozenset((*fit.names, name)): [*fit.effects, effect]
+                      for fit in generation for name, effect in single.items()
+                      if name not in fit.names}
+            begun = self._in_parallel(_begun, self._search, [
                 effects for effects in larger.values() if not _replaced(effects)])
-            generation.sort(key=lambda fit: self._search.error(fit.predicted))
-            found += [fit for number, fit in enumerate(generation) if number < JUDGED
-                      or all(effect.universal for effect in fit.effects)]
+            generation = self._best(self._in_parallel(_fitted, self._search, [
+                fit.effects for fit in self._best(begun, 2 * GROWN)]), GROWN)
+            errors.update((frozenset(fit.names), self._fitted_error(fit)) for fit in generation)
+            found += [fit for fit in generation if self._all_help(fit, errors)]
         return found
+
+    def _best(self, fits: Sequence[Fit], count: int) -> list[Fit]:
+        """Return those with the least errors of fitted rows, and those of universal effects."""
+        order = sorted(fits, key=self._fitted_error)
+        return order[:count] + [fit for fit in order[count:]
+                                if all(effect.universal for effect in fit.effects)]
+
+    def _all_help(self, fit: Fit, errors: Mapping[frozenset[str], float]) -> bool:
+        """
+        Whether no effect can be left out of a set at no cost.
+
+        Without what takes the first stage's place, the rest would be no part of the set.
+        """
+        largest = (1.0 - WORTH_JUDGING) * np.array([
+            errors.get(frozenset(fit.names) - {effect.id}, np.inf) for effect in fit.effects
+            if not (isinstance(effect, MaterialEffect) and effect.load_per_drive_squared > 0.0)])
+        return bool(np.all(self._fitted_error(fit) <= largest))
+
+    def _fitted_error(self, fit: Fit) -> float:
+        return self._search.error(fit.predicted)
 
     def _keep_stable(self) -> None:
         """
@@ -262,18 +285,24 @@ def _alone(fitter: BenchFitter, name: str) -> Fit | None:
         return _finite(fitter.search([], effect))
 
 
-def _together(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
-    """Fit some effects, the last of them new, from usual values and from those that each had."""
+def _begun(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
+    """Begin to fit effects, the last of them new, from usual values or those that each had."""
     kind = fitter.problem.kind
     with np.errstate(all='ignore'):
-        return _finite(fitter.best_of([
+        return _finite(fitter.begin([
             usual(effects, kind), effects, [*effects[:-1], *usual(effects[-1:], kind)]]))
+
+
+def _fitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
+    """Fit some effects from their present values."""
+    with np.errstate(all='ignore'):
+        return _finite(fitter.fit(effects))
 
 
 def _judged(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
     """Fit some effects from their present values, and cross-validate the fit."""
     with np.errstate(all='ignore'):
-        fit = _finite(fitter.fit(effects))
+        fit = _fitted(fitter, effects)
         if fit is None:
             return None
         fit = fitter.cross_validate(fit)

@@ -17,6 +17,8 @@ ROUNDING = 1e-12
 SINGULAR = 1        # state of `pivot`
 # Unknowns that are tried at once, at least.
 FEWEST_MORE = 10
+# Share of unknowns off their bound from which on all are taken at once.
+MANY = 0.3
 NO_SOLUTION = 'least squares: the problem is singular; use a strength above 0'
 
 
@@ -69,7 +71,7 @@ def solve_rows(design: np.ndarray, target: np.ndarray, penalty: np.ndarray, free
     """
     Minimise |design @ x - target|^2 / n + x @ penalty @ x with x >= 0 except where `free`.
 
-    Few of many unknowns leave their bound, so `solve_nonnegative` takes those of `start` and, as
+    Where few of many unknowns leave their bound, `solve_nonnegative` takes those of `start` and, as
     long as there are any, those that would improve most on its result: of the square of `design`
     only their part is computed.
 
@@ -100,6 +102,8 @@ def solve_rows(design: np.ndarray, target: np.ndarray, penalty: np.ndarray, free
     tolerance = TOLERANCE * max(float(np.max(np.abs(moment))), 1e-300)
     passive = free.copy() if start is None else (start | free)
     tried = passive.copy()
+    if np.count_nonzero(passive) > MANY * len(free):
+        tried[:] = True
     while True:
         index = np.flatnonzero(tried)
         part, curvature = design[:, index], penalty[index]
@@ -107,7 +111,6 @@ def solve_rows(design: np.ndarray, target: np.ndarray, penalty: np.ndarray, free
                                       free[index], passive[index])
         gradient = (part @ x / count) @ design + x @ curvature - moment
         gradient[tried] = 0.0
-        passive = np.zeros(len(free), dtype=bool)
         passive[index] = inside
         better = np.flatnonzero(gradient < -tolerance)
         if len(better) == 0:
@@ -115,7 +118,8 @@ def solve_rows(design: np.ndarray, target: np.ndarray, penalty: np.ndarray, free
             found[index] = x
             return found, passive
         most = max(len(index) // 2, FEWEST_MORE)
-        tried[better[np.argsort(gradient[better])[:most]]] = True
+        more = better[np.argsort(gradient[better])[:most]]
+        tried[more] = passive[more] = True
 
 
 def solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
