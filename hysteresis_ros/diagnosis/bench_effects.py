@@ -14,6 +14,7 @@ from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.extend import extended_model, undetermined
+from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
@@ -93,8 +94,8 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
 
     Constant loads on a bench hardly tell the wire's own elasticity from the growth of its stroke,
     and few rows may not prove either; but on an arm the load moves while the wire does. What is
-    known beforehand needs no proof against chance, only held-out rows that do not speak against it,
-    and that determine its parameters.
+    known beforehand needs no proof against chance, only rows that determine its parameters, be it
+    those that are held out, and that do not speak against it.
     """
     fitter = BenchFitter(BenchProblem(model, [fitted]).finer())
     names = [effect.id for effect in found]
@@ -107,9 +108,13 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
     def tried(effects: Sequence[Effect]) -> tuple[float, list[Effect]]:
         fit = fitter.fit(effects)
         fitted_effects = fitter.with_intervals(fit)
-        if fit.implausible() or any(undetermined(one, 'bench') for one in fitted_effects[
-                len(found):]):
+        vague = [one for one in fitted_effects[len(found):] if undetermined(one, 'bench')]
+        # Where no effect explains the load, held-out loads would tell of what is missing.
+        if fit.implausible() or len(vague) > (1 if found else 0):
             return np.inf, fitted_effects
+        if vague:
+            others = [one for one in fit.effects if one.id != vague[0].id]
+            return located(fitter, others, vague[0], practical) or (np.inf, fitted_effects)
         return fitter.error(fitter.cross_validate(fit).held_out), fitted_effects
 
     # Alone they have to help; together with one that was found they only must not harm.

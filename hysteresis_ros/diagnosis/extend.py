@@ -236,6 +236,10 @@ def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Mea
                   for effects in (known, added)]
         added = fitter.with_intervals(min(rivals, key=lambda fit: (
             len(fit.implausible()), fitter.error(fit.predicted))))
+        vague = {effect.id for effect in added if undetermined(effect, problem.kind)}
+        if any(effect.id in vague and not undetermined(effect, problem.kind) for effect in known):
+            # What only held-out rows have determined is not fitted again.
+            added = list(known)
     completed = problem.completed([*problem.model.effects, *added])
     return _stamped(completed, added, train, problem.kind), added
 
