@@ -129,6 +129,7 @@ def bench_tables(material, seed):
     return tables
 
 
+@pytest.mark.slow
 def test_slopes_that_differ_are_named_on_the_bench_and_no_r_phase():
     """C_M / C_A = 1.3; that came out as an R-phase."""
     material = dataclasses.replace(specimen(2), cooling_ratio=1.3)
@@ -165,6 +166,7 @@ class GaussianGrowth(GrainMaterial):
             -(stress / (1.3 * self.orienting_stress)) ** 2)
 
 
+@pytest.mark.slow
 def test_growth_of_another_form_has_the_right_name():
     fields = dataclasses.asdict(specimen(5))
     fields['grains'] = specimen(5).grains
