@@ -8,7 +8,7 @@ import numpy as np
 
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.effects import catalogue
-from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.measurements import Measurement, write_csv
 from hysteresis_ros.model import LinearModel, MuscleModel
 from hysteresis_ros.operators import Preisach
 
@@ -105,3 +105,13 @@ def runs(model, trials=3, rows=ROWS, seed=0, dt=30.0, sizes=None):
     columns = {'time': time, 'trial': trial, 'voltage': voltage, 'angle': np.ones(len(voltage))}
     angle = model.predict(Measurement.from_columns(columns))
     return Measurement.from_columns({**columns, 'angle': angle})
+
+
+def heavier_arm(folder, grams, recordings):
+    """Fill a folder with a model and recordings (name to seed) of an arm that carries more."""
+    base = bicep_model()
+    base.save(folder / 'model.yaml')
+    arm = base.with_effects([effect_of(base, 'payload_error', dm=grams)])
+    for name, seed in recordings.items():
+        write_csv(runs(arm, trials=4, rows=30, seed=seed), folder / name)
+    return folder

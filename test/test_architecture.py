@@ -3,6 +3,7 @@
 """Who may import whom, and what no file may do."""
 
 import ast
+import functools
 import os
 import re
 import subprocess
@@ -27,6 +28,7 @@ UNSAFE_CALLS = {'eval', 'exec', 'os.system', 'os.popen', 'joblib.load', 'joblib.
                 'yaml.full_load', 'yaml.full_load_all'}
 
 
+@functools.cache
 def modules(root):
     """Return the package's modules: name to syntax tree and the parts of its package's name."""
     found = {}

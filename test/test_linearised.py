@@ -96,7 +96,7 @@ def test_p_values_are_those_of_the_best_of_all_effects():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('trials, rows, rho', [(4, 60, 0.0), (4, 60, 0.9), (4, 60, 0.98),
+@pytest.mark.parametrize('trials, rows, rho', [(3, 40, 0.0), (3, 40, 0.9), (3, 40, 0.98),
                                                (1, 60, 0.9), (1, 60, 0.98)])
 def test_autocorrelated_noise_is_seldom_taken_for_an_effect(trials, rows, rho):
     """Five in a hundred are asked for; of 60 at most 8 with a probability of 99 %."""

@@ -176,6 +176,20 @@ def test_a_run_after_another_needs_fewer_passes_and_gives_the_same(monkeypatch, 
     np.testing.assert_array_equal(found[0], found[1])
 
 
+def test_another_set_begins_with_the_phase_of_the_run_before(monkeypatch):
+    """Most sets that are compared change the phase little, so that fewer passes do."""
+    model = bicep_model()
+    effects = [effect_of(model, 'creep'), effect_of(model, 'payload_error', dm=1.0)]
+    given = outputs_given(monkeypatch)
+    Simulator(model, arm_run(VOLTAGE, 0.1)).run(effects)
+    fresh = len(given)
+    simulator = Simulator(model, arm_run(VOLTAGE, 0.1))
+    simulator.run(effects[:1])
+    given.clear()
+    simulator.run(effects)
+    assert len(given) < fresh
+
+
 def test_a_run_is_never_that_of_the_phase_before(monkeypatch):
     """However small the step of a parameter, or derivatives would lack what the phase answers."""
     model = bicep_model()

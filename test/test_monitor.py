@@ -191,6 +191,7 @@ def test_a_reset_outdates_what_is_being_diagnosed():
     assert arm.monitor.diagnoses == 0 and arm.monitor.values(0.0)['settled holds'] == 0
 
 
+@pytest.mark.slow
 def test_the_recording_gives_the_same_answer(tmp_path):
     """Its history leads the model to where the arm was; what the monitor judges is judged."""
     arm = Arm(BAND, *[Outcome(found('unknown'), '', 1.0)] * 40)

@@ -49,6 +49,7 @@ def named(chosen, *names):
     return [candidate for candidate in chosen if candidate.name in names]
 
 
+@pytest.mark.slow
 def test_on_the_bench_two_stages_are_best_and_the_line_is_worst(bench):
     chosen, left_out = candidates(*bench, True)
     assert not left_out
@@ -209,6 +210,7 @@ def test_the_command_prints_a_table_writes_json_and_draws(tmp_path, capsys, monk
         assert error.startswith('hysteresis operators: error: ')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name, kept, worst', [
     ('piezo/stack_nested_loops.csv', 'Bouc-Wen', 0.02),
     ('sma_react/nitihf_isobaric.csv', 'two-stage Preisach N = 10', 0.25)])

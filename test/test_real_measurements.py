@@ -34,6 +34,7 @@ def percent(model, measurement, span):
     return 100.0 * np.mean(np.abs(error)) / span
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('alloy', ALLOYS)
 def test_the_load_that_a_plain_operator_does_not_know_is_found(data, alloy):
     """Stress shifts the transformation and makes it larger: two effects, on stresses not seen."""

@@ -118,6 +118,65 @@ def test_two_effects_behind_one_are_found_as_a_pair(model):
     assert (found.verdict, set(found.missing)) == ('missing', {'payload_error', 'supply_sag'})
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize('hidden, judged', [
+    ({'payload_error': {'dm': -15.0}, 'supply_sag': {'Rs': 0.8}}, None),
+    ({'end_stop': {}, 'payload_error': {'dm': 25.0}}, 'payload_error')],
+    ids=['all', 'least-squares'])
+def test_sets_are_fitted_in_the_units_that_they_are_judged_by(hidden, judged):
+    """Fitted once more from their values they gain nothing, where the way there is rough, too."""
+    model = bicep_model(metrics={'length': {'verification': {'rmse': 1e-4}}})
+    effects = [effect_of(model, name, **values) for name, values in hidden.items()]
+    found = selection(model, recording(model, effects),
+                      [*TRIED, 'airflow', 'pwm_dead_zone', 'end_stop'])
+    for names, fit in found.fits.items():
+        if judged is None or names == {judged}:
+            assert found.fitter.polished(fit).log_evidence < fit.log_evidence + 1.0, names
+
+
+def test_a_pair_that_is_stuck_is_fitted_from_all_starts(monkeypatch):
+    """The start that is best by linearisation may be one that no fit gets away from."""
+    model = bicep_model(metrics={'length': {'verification': {'rmse': 1e-4}}})
+    names = frozenset(['payload_error', 'supply_sag'])
+    measured = recording(model, [effect_of(model, 'payload_error', dm=-15.0),
+                                 effect_of(model, 'supply_sag', Rs=0.8)])
+    found = selection(model, measured)
+    good = found.fits[names]
+    stuck, = found.fitter.fit([[effect.with_values(**dict.fromkeys(effect.values, 1e-3))
+                                for effect in good.effects]], found._metric(), 0)
+    assert stuck.log_evidence < good.log_evidence - 20.0
+    monkeypatch.setitem(found.fits, names, stuck)
+    found._fit_from_all_starts(2)
+    assert found.fits[names].log_evidence > good.log_evidence - 1.0
+
+
+@pytest.mark.parametrize('change, tried', [(0.0, []), (0.2, [2])])
+def test_all_starts_are_tried_where_nothing_suffices(model, monkeypatch, change, tried):
+    sizes = []
+    monkeypatch.setattr(Selection, '_fit_from_all_starts', lambda _, size: sizes.append(size))
+    measured = recording(model, [effect_of(model, 'payload_error', dm=15.0)])
+    shape = np.sin(7.0 * np.arange(measured.rows) ** 1.5)
+    angle = measured.column('angle') + change * shape
+    selection(model, Measurement.from_columns({**measured.columns, 'angle': angle}))
+    assert sizes == tried
+
+
+def test_what_suffices_alone_grows_alone(payload, monkeypatch):
+    """Of sets of several effects; of single effects all the most probable ones do."""
+    small, pair = frozenset(['payload_error']), frozenset(['payload_error', 'frame_tilt'])
+    monkeypatch.setattr(payload, '_promising', lambda names: True)
+    monkeypatch.setattr(payload.covariance, 'size', 0.0)
+    assert payload._worth_growing(1) == payload._ranked_of(1)
+    assert payload._worth_growing(2) == []
+    monkeypatch.setattr(payload, 'valid', lambda: [pair, small])
+    monkeypatch.setitem(payload.fits, pair, payload.fits[small])
+    assert payload._worth_growing(2) == [pair]
+    monkeypatch.setattr(payload, '_promising', lambda names: False)
+    assert payload._worth_growing(2) == []
+    monkeypatch.setattr(payload, 'noise_free_rmse', lambda names: 2.0 * payload.rmse_95)
+    assert payload._worth_growing(2) == payload._ranked_of(2)
+
+
 def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
     """A fan is a sag to an arm at rest; in its place the sag itself is found."""
     model = bicep_model(metrics={'length': {'verification': {'rmse': 0.0001}}})

@@ -8,7 +8,7 @@ import socket
 import sys
 import threading
 
-from model_support import bicep_model, effect_of, runs, wandering_voltage
+from model_support import bicep_model, effect_of, heavier_arm, wandering_voltage
 import numpy as np
 import pytest
 import yaml
@@ -19,14 +19,15 @@ from hysteresis_ros.cli.main import main
 from hysteresis_ros.diagnosis.extend import rmse
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import MeasurementError, ParameterError
-from hysteresis_ros.measurements import Measurement, read_measurement, write_csv
+from hysteresis_ros.measurements import Measurement, read_measurement
 from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.model.simulation import Simulator
 from hysteresis_ros.studio import charts, server
 from hysteresis_ros.studio.feed import Feed
 from hysteresis_ros.studio.jobs import Job
-from hysteresis_ros.studio.session import axis, Session
+from hysteresis_ros.studio.session import Session
 from hysteresis_ros.studio.sliders import rounded, sliders_of
+from hysteresis_ros.studio.views import axis
 
 TRUTH = 15.0    # g
 
@@ -34,13 +35,7 @@ TRUTH = 15.0    # g
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
     """Return a folder with a model and two recordings of an arm with 15 g too much."""
-    folder = tmp_path_factory.mktemp('studio')
-    base = bicep_model()
-    base.save(folder / 'model.yaml')
-    arm = base.with_effects([effect_of(base, 'payload_error', dm=TRUTH)])
-    for name, seed in (('train.csv', 1), ('test.csv', 50)):
-        write_csv(runs(arm, trials=4, rows=30, seed=seed), folder / name)
-    return folder
+    return heavier_arm(tmp_path_factory.mktemp('studio'), TRUTH, {'train.csv': 1, 'test.csv': 50})
 
 
 @pytest.fixture

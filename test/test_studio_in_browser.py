@@ -12,11 +12,11 @@ import sys
 import time
 
 from browser_support import Browser, find_browser, MISSING
-from model_support import bicep_model, effect_of, runs
+from model_support import heavier_arm
 import pytest
 
 from hysteresis_ros.diagnosis.extend import rmse
-from hysteresis_ros.measurements import read_measurement, write_csv
+from hysteresis_ros.measurements import read_measurement
 from hysteresis_ros.model import MuscleModel
 
 pytest.importorskip('nicegui', reason="no NiceGUI; pip install 'hysteresis_ros[studio]'")
@@ -98,12 +98,7 @@ class Tab:
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
     """Return a folder with a model and a recording of an arm with 15 g too much."""
-    folder = tmp_path_factory.mktemp('studio')
-    base = bicep_model()
-    base.save(folder / 'model.yaml')
-    arm = base.with_effects([effect_of(base, 'payload_error', dm=TRUTH)])
-    write_csv(runs(arm, trials=4, rows=30, seed=1), folder / 'train.csv')
-    return folder
+    return heavier_arm(tmp_path_factory.mktemp('studio'), TRUTH, {'train.csv': 1})
 
 
 @pytest.fixture(scope='module')

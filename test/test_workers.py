@@ -107,6 +107,7 @@ def test_a_diagnosis_leaves_blas_one_thread(three):
     assert set(threads()) == {3}
 
 
+@pytest.mark.slow
 def test_workers_have_one_thread_each(three):
     """In a process of its own as well."""
     found = list(in_parallel([delayed(threads_of_worker)()] * 4, 2))
@@ -120,6 +121,7 @@ def test_results_come_in_the_order_of_the_tasks():
         assert list(in_parallel(tasks, jobs)) == [None, (3, 1), [2, 1]]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path('/proc').is_dir(), reason='processes are looked up in /proc')
 def test_workers_end_when_their_parent_is_killed(root, tmp_path):
     """SIGKILL leaves no time to tell them, and a batch system uses it."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING
 
@@ -122,13 +123,16 @@ class Selection:
     def _grow_sets(self) -> None:
         """Grow sets, size by size, while the residual of the best one is too large."""
         for size in range(1, self.settings.most_effects):
-            if not self._worth_growing():
+            grown_from = self._worth_growing(size)
+            if not grown_from:
                 break
             if size == 1:
                 self._fit_best(self.alone.pairs())
-            for names in self._ranked_of(size):
+            for names in grown_from:
                 self.grow(names)
             self._refine(size + 1)
+            if size == 1 and not any(map(self.sufficient, self.valid())):
+                self._fit_from_all_starts(2)
         self._refine_best()
         self._exchange()
 
@@ -144,16 +148,23 @@ class Selection:
                             [*self.alone.starts, *fitted])
         return family.p_values(self.fitter.point(self.base), self.rng, self.settings.draws)
 
-    def _worth_growing(self) -> bool:
-        """Whether the best set's residual is too large, or one more effect explains some of it."""
+    def _worth_growing(self, size: int) -> list[frozenset[str]]:
+        """
+        Return the sets of a size that are worth one more effect.
+
+        The most probable ones, if the best set's residual is too large. If it is not, but a further
+        effect explains some of it: all of these single effects, and of larger sets the best alone.
+        """
         valid = self.valid()
-        if not valid:
-            return True
-        best = next((names for names in valid if self.sufficient(names)), valid[0])
-        if self.noise_free_rmse(best) > self.rmse_95:
-            return True
+        best = next(filter(self.sufficient, valid), valid[0] if valid else None)
+        if best is None or self.noise_free_rmse(best) > self.rmse_95:
+            return self._ranked_of(size)
         # What a further effect explains has to exceed the base model's own error.
-        return bool(best) and self.error(best) > self.covariance.size and self._promising(best)
+        if not best or self.error(best) <= self.covariance.size or not self._promising(best):
+            return []
+        if size == 1:
+            return self._ranked_of(size)
+        return [best] if len(best) == size else []
 
     def _promising(self, names: frozenset[str]) -> bool:
         """Whether one more effect makes a set more probable, by linearisation."""
@@ -219,13 +230,32 @@ class Selection:
             linearised_starts(self.fitter, fit, others), fit.jacobian * spread)
 
     def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
-        """Fit the best sets for a few steps, and the best of these to the end."""
+        """Fit the best sets of those scored."""
         order = sorted(scored.values(), key=lambda item: -item[0])
-        begun = self.fitter.fit(
-            [effects for _, effects in order[:BEGUN * self.settings.refits]],
-            self._metric(), FIRST_STEPS, exact=False)
-        begun.sort(key=lambda fit: -fit.log_evidence)
-        self._fit([fit.effects for fit in begun[:self.settings.refits]])
+        self._begin([effects for _, effects in order[:BEGUN * self.settings.refits]])
+
+    def _begin(self, sets: Sequence[Sequence[Effect]]) -> None:
+        """Fit sets for a few steps, and the best of these to the end, each from one start."""
+        begun = self.fitter.fit(sets, self._metric(), FIRST_STEPS, exact=False)
+        best: dict[tuple[str, ...], Fit] = {}
+        for fit in sorted(begun, key=lambda fit: -fit.log_evidence):
+            best.setdefault(fit.names, fit)
+        self._fit([fit.effects for fit in list(best.values())[:self.settings.refits]])
+
+    def _fit_from_all_starts(self, size: int) -> None:
+        """
+        Fit the most probable sets of a size from all starts of their effects.
+
+        The start that scores best by linearisation may be one that no fit gets away from.
+        """
+        probable = [names for names in self.ranked() if len(names) == size]
+        starts: list[tuple[Effect, ...]] = []
+        for names in probable[:self.settings.refits]:
+            starts += itertools.product(*(
+                starts_of(effect, self.problem.kind, self.problem.measured)
+                for effect in self.fits[names].effects))
+        self._begin(starts)
+        self._refine(size)
 
     def _exchange(self) -> None:
         """

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hysteresis_ros.studio.session import Curves
+    from hysteresis_ros.studio.views import Curves
 
 # Up to this many rows each is a dot on its line.
 MOST_SYMBOLS = 400

@@ -17,12 +17,13 @@ from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.report.words import verdict_in_words
 from hysteresis_ros.studio import charts
 from hysteresis_ros.studio.jobs import Job
-from hysteresis_ros.studio.session import Entry, Errors, MODEL_NAME, REPORT_NAME
+from hysteresis_ros.studio.session import MODEL_NAME, REPORT_NAME
 
 if TYPE_CHECKING:
     from hysteresis_ros.studio.feed import Feed
     from hysteresis_ros.studio.session import Session
     from hysteresis_ros.studio.sliders import Slider
+    from hysteresis_ros.studio.views import Entry, Errors
 
 Result = TypeVar('Result')
 # Time between two looks at whether another tab, a job or the arm has changed something [s].

@@ -11,7 +11,6 @@ simulates the recordings anew. Fit, diagnosis, saving and report are those of th
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-import dataclasses
 import os
 import threading
 from typing import TYPE_CHECKING
@@ -26,12 +25,13 @@ from hysteresis_ros.diagnosis.observable import may_differ, observable, present
 from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue, effect_class
 from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.measurements.quantities import QUANTITIES, shown
+from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.report.provenance import Origin
 from hysteresis_ros.report.recording import extremes
 from hysteresis_ros.studio.commands import Source
 from hysteresis_ros.studio.parts import Part, parts_of, rows_of, select
 from hysteresis_ros.studio.sliders import Slider, sliders_of
+from hysteresis_ros.studio.views import axis, Curves, Entry, Errors
 
 if TYPE_CHECKING:
     from hysteresis_ros.api import Progress
@@ -49,72 +49,6 @@ UNSEEN_SHARE = 4
 # As many rows as a chart shows.
 MOST_DRAWN = 3000
 MODEL_NAME, REPORT_NAME = 'extended.yaml', 'report.html'
-
-
-@dataclasses.dataclass(frozen=True)
-class Entry:
-    """
-    An effect of the catalogue as the page lists it.
-
-    Attributes
-    ----------
-    name, stage, sentence : str
-        Identifier, stage, and what it is.
-    ticked : bool
-        Whether it is added now.
-    built_in : bool
-        Whether the model has it for good.
-    hidden : str
-        Why these recordings cannot show it; '' if they can.
-    probability : float or None
-        That it is missing, after a diagnosis.
-    """
-
-    name: str
-    stage: str
-    sentence: str
-    ticked: bool
-    built_in: bool
-    hidden: str
-    probability: float | None
-
-
-@dataclasses.dataclass(frozen=True)
-class Errors:
-    """RMSE of the base model and of the present one, in the unit of the response."""
-
-    before: float
-    now: float
-
-
-@dataclasses.dataclass(frozen=True)
-class Curves:
-    """
-    What the charts draw, one value a row, in the units that a person thinks in.
-
-    Attributes
-    ----------
-    x : ndarray, shape (n,)
-        Time, or the number of the row.
-    x_label, y_label, unit : str
-        What is drawn, and the unit of the response.
-    measured, before, now : ndarray, shape (n,)
-        The response: measured, of the base model, of the present one.
-    trial : ndarray of int, shape (n,)
-        Trials of all recordings; a line ends where the next begins.
-    unseen : list of (float, float)
-        Where on the axis the rows lie that are not fitted.
-    """
-
-    x: np.ndarray
-    x_label: str
-    y_label: str
-    unit: str
-    measured: np.ndarray
-    before: np.ndarray
-    now: np.ndarray
-    trial: np.ndarray
-    unseen: list[tuple[float, float]]
 
 
 class Session:
@@ -577,22 +511,3 @@ class Session:
             refuse_input(Given('save', path), given)
         check_file(Given('save', path), set())
         return path
-
-
-def axis(time: np.ndarray | None, rows: int) -> tuple[np.ndarray, str]:
-    """
-    Return what runs along the charts, and its name.
-
-    Parameters
-    ----------
-    time : ndarray, shape (n,), or None
-        s, of all trials one after the other.
-    rows : int
-        n.
-    """
-    if time is None:
-        return np.arange(rows, dtype=float), 'row'
-    for name, seconds in (('h', 3600.0), ('min', 60.0)):
-        if time[-1] > (10800.0 if name == 'h' else 600.0):
-            return time / seconds, f'time [{name}]'
-    return time, f'time [{QUANTITIES["time"].unit}]'
