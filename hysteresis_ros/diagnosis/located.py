@@ -25,6 +25,8 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect, practi
     """
     Return the effects with the value of the last one that predicts held-out rows best.
 
+    None where held-out rows do not determine the value, either.
+
     Parameters
     ----------
     fitter : BenchFitter
@@ -42,7 +44,6 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect, practi
         Held-out RMSE, in the unit of the response.
     effects : list of Effect
         All, with intervals.
-        None if held-out rows do not determine the value, either.
     """
     free = [parameter for parameter in effect.parameters if fitter.problem.kind in parameter.kinds]
     if len(free) != 1 or not free[0].log:

@@ -69,7 +69,7 @@ def solve_nonnegative(
 def solve_rows(design: np.ndarray, target: np.ndarray, penalty: np.ndarray, free: np.ndarray,
                start: Optional[np.ndarray] = None) -> tuple:
     """
-    Minimise |design @ x - target|^2 / n + x @ penalty @ x with x >= 0 except where `free`.
+    Minimise ``|design @ x - target|^2 / n + x @ penalty @ x``, x >= 0 except where `free`.
 
     Where few of many unknowns leave their bound, `solve_nonnegative` takes those of `start` and, as
     long as there are any, those that would improve most on its result: of the square of `design`
