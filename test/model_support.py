@@ -25,7 +25,7 @@ STRENGTHS = {
     'ambient_temperature': {'gain': 0.3, 'reference': 25.0},
     'ambient_drift': {'offset': 0.5, 'rate': 1.0, 'curvature': -0.3},
     'stress_dependence': {'shift': 0.15}, 'stress_dependent_strain': {'r': 0.5, 'F0': 1.2},
-    'series_compliance': {'compliance': 0.05},
+    'series_compliance': {'compliance': 0.05}, 'transformation_slopes': {'g': 0.3},
     'r_phase': {'strain': 0.2, 'position': 0.2, 'width': 0.05},
     'creep': {'c': 0.1, 't0': 3.0}, 'fatigue': {'b': 0.05, 'a': 0.02}, 'slack': {'Ls': 0.5},
     'unequal_muscles': {'shorter': 0.6, 'longer': 0.9}, 'coulomb_friction': {'tau_c': 0.02},

@@ -325,7 +325,8 @@ class Wires(MaterialEffect):
 
 
 @pytest.mark.parametrize('names', [(), ('coulomb_friction',), ('viscous_friction',),
-                                   ('stress_dependent_strain', 'coulomb_friction')])
+                                   ('stress_dependent_strain', 'coulomb_friction'),
+                                   ('transformation_slopes',)])
 def test_equal_muscles_in_parallel_are_one(names):
     one = balance(*names)
     model = MODEL.with_effects([*(effect_of(MODEL, name) for name in names), Wires(0., 0., 0.)])
@@ -341,12 +342,14 @@ def test_equal_muscles_in_parallel_are_one(names):
             assert three.output == pytest.approx(one.output, abs=1e-7)
 
 
-@pytest.mark.parametrize('elastic, strain', [
-    (None, {}), (0.3, {}), (0.3, {'r': 0.5, 'F0': 0.8, 'growth': 0.1})])
-def test_unequal_muscles_share_the_load_of_brute_force(elastic, strain):
-    """Each strains and stretches as its own load says."""
+@pytest.mark.parametrize('elastic, strain, g', [
+    (None, {}, 0.0), (0.3, {}, 0.0), (0.3, {'r': 0.5, 'F0': 0.8, 'growth': 0.1}, 0.0),
+    (None, {}, 0.3), (0.3, {'r': 0.5, 'F0': 0.8}, -0.3)])
+def test_unequal_muscles_share_the_load_of_brute_force(elastic, strain, g):
+    """Each strains and stretches, and has a loop, as its own load says."""
     offsets = (-0.8e-3, 0.0, 1.2e-3)
-    names = {'unequal_muscles': {'shorter': 0.8, 'longer': 1.2}, 'stress_dependent_strain': strain}
+    names = {'unequal_muscles': {'shorter': 0.8, 'longer': 1.2}, 'stress_dependent_strain': strain,
+             'transformation_slopes': {'g': g}}
     compliance = COMPLIANCE
     if elastic:
         names['series_compliance'] = {'compliance': elastic}
@@ -363,15 +366,18 @@ def test_unequal_muscles_share_the_load_of_brute_force(elastic, strain):
             stretch = chain.stretch(load)
             total = 0.0
             for stage, excess in zip(stages, offsets):
-                def missing(u, stage=stage, excess=excess):
+                def played(v, stage=stage):
+                    return min(max(stage.input, v - chain.loop_width(v + x)), v)
+
+                def missing(v, stage=stage, excess=excess, played=played):
                     # What a wire bears more than the mean stretches it, too.
-                    return (base + chain.scale(u + x) * (stage.peek(u) - base)
-                            + compliance * (u + x - load)
+                    return (base + chain.scale(v + x) * (stage.peek(played(v)) - base)
+                            + compliance * (v + x - load)
                             - (GEOMETRY.length(theta) - stretch - excess))
-                u = optimize.brentq(missing, -200.0, 200.0, xtol=1e-13)
-                total += max(u + x, 0.0)
+                v = optimize.brentq(missing, -200.0, 200.0, xtol=1e-13)
+                total += max(v + x, 0.0)
                 if commit:
-                    stage.step(u)
+                    stage.step(played(v))
             return load - total / 3.0
 
         theta = optimize.brentq(lacking, 0.9, 2.3, xtol=1e-12)
@@ -399,7 +405,7 @@ def test_friction_holds_unequal_muscles_by_what_they_pull_together():
        st.floats(0.2, 0.8))
 def test_drive_of_a_bundle_undoes_its_share(offsets, load, share):
     stage = MODEL.require_length_stage()
-    bundle = Bundle(stage, MODEL.with_effects([Wires(*offsets)]).chain())
+    bundle = Bundle(stage, MODEL.with_effects([Wires(*offsets)]).chain(), True)
     low, high = stage.output_range
     output = low + share * (high - low)
     x = bundle.drive(output, load)
@@ -410,7 +416,7 @@ def test_drive_of_a_bundle_undoes_its_share(offsets, load, share):
 
 def test_bundle_stays_within_the_limits_of_its_search():
     bundle = Bundle(MODEL.require_length_stage(),
-                    MODEL.with_effects([Wires(0.0, 1e-3)]).chain())
+                    MODEL.with_effects([Wires(0.0, 1e-3)]).chain(), True)
 
     def place(load, near):
         return bundle.respond(0.0, load, -0.02, 0.0, near)[0]

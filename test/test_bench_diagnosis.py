@@ -131,7 +131,7 @@ def test_creep_of_a_polymer_shows_and_is_plausible():
     assert found.missing == ['creep']
     assert found.effects[0].values['kept'] == 1.0
     assert not found.effects[0].implausible()
-    assert found.rmse_after < 0.5 * found.rmse_before
+    assert found.rmse_after < 0.55 * found.rmse_before
 
 
 def test_ratcheting_shows_though_every_trial_begins_anew():
@@ -140,7 +140,7 @@ def test_ratcheting_shows_though_every_trial_begins_anew():
     assert found.missing == ['fatigue']
     assert found.effects[0].values['kept'] == 0.0
     assert not found.effects[0].implausible()
-    assert found.rmse_after < 0.5 * found.rmse_before
+    assert found.rmse_after < 0.55 * found.rmse_before
 
 
 @pytest.mark.parametrize('name, values', [
@@ -203,6 +203,10 @@ def test_the_elasticity_of_the_wire_is_added_to_what_the_bench_proves():
     extended, added = add_effects(model, length, force, **trials)
     assert {effect.id for effect in added} == {
         'stress_dependence', 'stress_dependent_strain', 'series_compliance'}
+    # Austenite of the laboratory's wire: 0.14 mm/N; martensite: 0.27 mm/N.
+    (elastic,) = (effect for effect in added if effect.id == 'series_compliance')
+    low, high = elastic.intervals['compliance']
+    assert 0.07 < low < elastic.compliance < high < 0.3 and high < 2.0 * low
     before, after = (one.metrics['length']['verification']['rmse'] for one in (model, extended))
     assert after < 0.3 * before
     # What the effects explain needs no smoothing, so that the rest is told more finely.

@@ -38,6 +38,8 @@ EXPECTED = {
     'fatigue': ('material', 'cycle count', 'reference loop', {'ambient_drift'}),
     'slack': ('material', 'low force', 'preload', {'r_phase', 'geometry_error'}),
     'series_compliance': ('material', 'force', 'weights', {'payload_error', 'geometry_error'}),
+    'transformation_slopes': ('material', "loop's width", 'three or more loads',
+                              {'stress_dependence', 'r_phase'}),
     'unequal_muscles': ('material', 'smeared knees', 'one muscle at a time',
                         {'slack', 'geometry_error'}),
     'coulomb_friction': ('mechanism', 'reversals', 'tap', {'backlash'}),
@@ -57,7 +59,7 @@ EXPECTED = {
 # Effect, parameter: unit and plausible range for a 0.2 mm wire on this arm.
 RANGES = {
     ('supply_sag', 'Rs'): ('Ohm', 0.05, 2.0), ('pwm_dead_zone', 'Vd'): ('V', 0.05, 1.5),
-    ('thermal_lag', 'time_constant'): ('s', 1.0, 10.0),
+    ('thermal_lag', 'time_constant'): ('s', 0.05, 100.0),
     ('heating_cooling_asymmetry', 'ratio'): ('1', 0.5, 2.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
     ('creep', 'c'): ('% of l0', 0.01, 0.5), ('slack', 'Ls'): ('mm', 0.1, 5.0),
     ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),

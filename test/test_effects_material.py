@@ -8,6 +8,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
+from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue, Inputs, Surroundings
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model.chain import Chain
@@ -139,6 +140,32 @@ def test_fatigue_drifts_and_shrinks_with_the_logarithm_of_the_cycles():
         np.zeros(3), np.zeros(3), inputs([1, 2, 3], [0.0, 1.0, 9.0]), WIRE)
     np.testing.assert_allclose(offset, -0.002 * 0.27 * np.log([1.0, 2.0, 10.0]))
     np.testing.assert_allclose(factor, 1.0 - 0.1 * np.log([1.0, 2.0, 10.0]))
+
+
+def test_an_old_muscle_wears_more_slowly_than_a_new_one():
+    """Cycles before the recording: ln(1 + (N + N0) / N1) against its start."""
+    time, cycles = np.arange(3.0), np.array([0.0, 10.0, 100.0])
+    drive = np.zeros(3)
+    for before in (1.0, 50.0):
+        worn = effect('fatigue', b=0.1, a=0.02, N0=before)
+        offset, factor = worn.drift(drive, drive, inputs(time, cycles=cycles), WIRE)
+        logarithm = np.log((cycles + before) / before)
+        np.testing.assert_allclose(offset, -0.001 * WIRE.length * logarithm)
+        np.testing.assert_allclose(factor, 1.0 - 0.02 * logarithm)
+
+
+def test_wear_is_not_carried_over_where_it_could_be_the_load():
+    worn = effect('fatigue', b=0.1).within_trials()
+    kept = next(parameter for parameter in worn.parameters if parameter.name == 'kept')
+    assert worn.kept == 0.0 and kept.choices == (0.0,)
+    # All starts of a fit, too.
+    assert {start.kept for start in starts_of(worn, 'bench')} == {0.0}
+    assert {start.kept for start in starts_of(effect('fatigue'), 'bench')} == {0.0, 1.0}
+
+
+def test_pressure_has_no_r_phase():
+    assert catalogue()['r_phase'].available(WIRE)
+    assert not catalogue()['r_phase'].available(WIRE._replace(drive='pressure'))
 
 
 def test_fatigue_of_another_specimen_begins_anew():

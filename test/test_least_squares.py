@@ -12,6 +12,7 @@ from scipy import optimize
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.least_squares import (
     Anchor, fit_weights, folds_of, quick_weights, SLACK, solve_nonnegative, STRENGTHS)
+from hysteresis_ros.identification.nonnegative import solve_rows
 from hysteresis_ros.identification.operators import smoothness
 from hysteresis_ros.operators import cell_areas, signed_areas
 
@@ -148,6 +149,20 @@ def test_weights_are_those_of_scipy_from_any_start(rows, columns):
         x, passive = solve_nonnegative(gram, moment, bounded, start)
         assert x == pytest.approx(expected, abs=1e-12)
         assert np.array_equal(passive, expected > 0.0)
+
+
+@pytest.mark.parametrize('rows, columns, strength', [(148, 500, 1e-3), (40, 300, 1.0)])
+def test_weights_found_by_parts_are_those_of_the_whole(rows, columns, strength):
+    rng = np.random.default_rng(columns)
+    design, target = rng.random(size=(rows, columns)), 5.0 * rng.random(rows)
+    penalty, free = strength * np.eye(columns), np.arange(columns) == columns - 1
+    expected, inside = solve_nonnegative(
+        design.T @ design / rows + penalty, design.T @ target / rows, free)
+    assert 2 < np.count_nonzero(inside) < columns // 2
+    for start in (None, inside, rng.random(columns) < 0.05, rng.random(columns) < 0.8):
+        x, passive = solve_rows(design, target, penalty, free, start)
+        assert x == pytest.approx(expected, abs=1e-10)
+        assert np.array_equal(passive, inside)
 
 
 def test_no_weight_is_below_zero_by_rounding():

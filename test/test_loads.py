@@ -59,7 +59,7 @@ def test_effects_change_the_error_of_loads_left_out(two_loads):
     extended, _ = add_effects(base, length, force, ['stress_dependent_strain'],
                               length_trials=range(4), force_trials=[0])
     before, after = (one.metrics['length']['left_out']['rmse'] for one in (base, extended))
-    assert after < 0.95 * before
+    assert after < 0.97 * before
     assert extended.metrics['length']['verification']['rmse'] > 0.0
 
 

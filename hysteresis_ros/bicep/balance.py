@@ -69,7 +69,7 @@ class ArmBalance:
         self.has_dynamics = chain.moves
         compliance = chain.compliance()
         several = len(chain.offsets) > 1
-        wires, self.operators, memories = wires_of(operator, chain)
+        wires, self.operators, memories = wires_of(operator, chain, loaded)
         frictions = (0.0, self.coulomb, -self.coulomb) if self.coulomb > 0.0 else (0.0,)
         lines = [_line(statics, leverage, friction, self.base, chain, loaded)
                  for friction in frictions]
@@ -90,7 +90,7 @@ class ArmBalance:
             # The wires of unequal muscles stretch when the drive changes, even if the arm sticks.
             rigid=not several and all(np.array_equal(line[0], lines[0][0]) for line in lines),
             strained=any(np.any(line[3] != 1.0) for line in lines), dynamic=self.has_dynamics,
-            swings=swings)
+            swings=swings, plays=chain.plays and loaded)
         self._state = State(memories, np.empty(MOTION), np.empty(len(self.operators)))
         self._kernels = kernels_for(operator, trial)
         self.start()
@@ -99,20 +99,20 @@ class ArmBalance:
         """Return the same arm with a state of its own."""
         other = copy.copy(self)
         other.operators, memories = with_own_memories(self.operators)
-        other._state = State(memories, self._state.motion.copy(), self._state.inputs.copy())
+        other._state = State(memories, self._state.motion.copy(), self._state.loads.copy())
         return other
 
     def snapshot(self) -> tuple[list[Any], np.ndarray, np.ndarray]:
         """Return the state for `rewind`."""
         return ([operator.snapshot() for operator in self.operators],
-                self._state.motion.copy(), self._state.inputs.copy())
+                self._state.motion.copy(), self._state.loads.copy())
 
     def rewind(self, snapshot: tuple[list[Any], np.ndarray, np.ndarray]) -> None:
         """Go back to a state that `snapshot` returned."""
-        memories, motion, inputs = snapshot
+        memories, motion, loads = snapshot
         for operator, memory in zip(self.operators, memories):
             operator.rewind(memory)
-        self._state.motion[:], self._state.inputs[:] = motion, inputs
+        self._state.motion[:], self._state.loads[:] = motion, loads
 
     def start(self) -> None:
         """Wipe the memory: after a full heat and cool cycle, before the first sample."""
@@ -184,7 +184,7 @@ def _line(statics: Statics, leverage: np.ndarray, friction: float, base: float, 
     Return the states of the arm at rest or against a moment of friction, each shape (n,).
 
     What the transformation has to give, without offset; the load that it feels; what a moment that
-    resists motion takes off that load; and what an offset counts.
+    resists motion takes off that load; what an offset counts; and the loop's width beyond H2's.
     """
     # A wire cannot push.
     force = np.maximum(statics.moment - friction, 0.0) / leverage
@@ -195,12 +195,14 @@ def _line(statics: Statics, leverage: np.ndarray, friction: float, base: float, 
     scale = chain.scale(force) + 0.0 * force
     demand = (statics.length - base - chain.stretch(force)) / scale
     # Past a fold, where the arm would fall, the nearest stable state is kept.
-    return np.maximum.accumulate(demand), load, weight / leverage, 1.0 / scale
+    return (np.maximum.accumulate(demand), load, weight / leverage, 1.0 / scale,
+            chain.loop_width(force) + 0.0 * force)
 
 
 def _muscle(chain: Chain, statics: Statics, leverage: np.ndarray, count: int
             ) -> tuple[np.ndarray, float]:
-    """Return a muscle's table over its load, shape (count, 3), and the spacing of the loads [N]."""
+    """Return a muscle's table over its load, shape (count, 4), and the spacing of the loads [N]."""
     loads = np.linspace(0.0, LARGEST * np.max(np.abs(statics.moment / leverage)), count)
-    columns = chain.load_inside(loads), chain.scale(loads), chain.stretch(loads)
+    columns = (chain.load_inside(loads), chain.scale(loads), chain.stretch(loads),
+               chain.loop_width(loads))
     return np.column_stack([column + 0.0 * loads for column in columns]), float(loads[1])

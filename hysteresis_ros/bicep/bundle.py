@@ -26,10 +26,12 @@ class Bundle:
         The second stage H2 of one muscle; it is copied for each.
     chain : Chain
         Effects of the model: excess lengths of the muscles, and how a wire strains under its load.
+    loaded : bool
+        Whether the load is weighed against the drive.
     """
 
-    def __init__(self, operator: HysteresisOperator, chain: Chain) -> None:
-        self._wires, self.operators, self._memories = wires_of(operator, chain)
+    def __init__(self, operator: HysteresisOperator, chain: Chain, loaded: bool) -> None:
+        self._wires, self.operators, self._memories = wires_of(operator, chain, loaded)
         self._kernels = kernels_for(operator, bundle)
         self._search = np.zeros(bundle.SEARCH)
         self._search[bundle.GAIN] = 1.0

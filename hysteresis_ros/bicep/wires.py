@@ -21,11 +21,12 @@ if TYPE_CHECKING:
 
 # Compliance [m/N] of a wire whose own is not known.
 COMPLIANCE = 2e-4
-# Loads at which the factor on the strain is laid out, up to this many times the bench's mean.
+# Loads at which the factor on the strain and the loop's width are laid out, up to this many times
+# the bench's mean.
 LOADS, LARGEST = 1000, 8.0
 
 
-def wires_of(operator: HysteresisOperator, chain: Chain
+def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
              ) -> tuple[Wires, list[HysteresisOperator], Any]:
     """
     Return parallel muscles with memories of their own.
@@ -36,6 +37,8 @@ def wires_of(operator: HysteresisOperator, chain: Chain
         The second stage H2 of one muscle; it is copied for each.
     chain : Chain
         Effects of the model: excess lengths of the muscles, and how a wire strains under its load.
+    loaded : bool
+        Whether the load is weighed against the drive.
 
     Returns
     -------
@@ -49,16 +52,19 @@ def wires_of(operator: HysteresisOperator, chain: Chain
     table: Any = operator.table if isinstance(operator, CompiledOperator) else None
     offsets = np.array(chain.offsets, dtype=float)
     operators, memories = with_own_memories([operator] * len(offsets))
-    scales, lightest, spacing = np.ones(1), 0.0, 1.0
-    if len(offsets) > 1:
+    scales, widths, lightest, spacing = np.ones(1), np.zeros(1), 0.0, 1.0
+    plays = chain.plays and loaded
+    if plays or len(offsets) > 1:
         loads = np.linspace(0.0, LARGEST * (chain.surroundings.load or 1.0), LOADS)
         inside = chain.load_inside(loads) + 0.0 * loads
         lightest, spacing = float(inside[0]), float(np.ptp(inside)) / (LOADS - 1)
-        scales = np.interp(np.linspace(inside[0], inside[-1], LOADS), inside,
-                           chain.scale(loads) + 0.0 * loads)
+        even = np.linspace(inside[0], inside[-1], LOADS)
+        scales = np.interp(even, inside, chain.scale(loads) + 0.0 * loads)
+        if plays:
+            widths = np.interp(even, inside, chain.loop_width(loads))
     return (Wires(table, operator.output_range[0], offsets,
                   chain.compliance() or COMPLIANCE, 1e-10 * (operator.upper - operator.lower),
-                  scales, lightest, spacing), operators, memories)
+                  scales, widths, lightest, spacing), operators, memories)
 
 
 def with_own_memories(operators: Sequence[HysteresisOperator]

@@ -13,7 +13,8 @@ import numpy as np
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.diagnosis.extend import extended_model
+from hysteresis_ros.diagnosis.extend import extended_model, undetermined
+from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
@@ -68,16 +69,17 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     ParameterError
         If an effect is unknown, named twice, already there, or cannot show in a bench table.
     """
-    rows = choose_trials(length, length_trials, 'length')
+    rows, known = choose_trials(length, length_trials, 'length'), []
     if not rows.any():
         raise IdentificationError('no trial is left to fit')
     fitted = length.select(sorted(set(length.column('trial')[rows].tolist())))
     if names is None:
         found = diagnose(model, [fitted], jobs=jobs, progress=progress).effects
-        names = _with_universal(model, found, fitted)
+        known = _with_universal(model, found, fitted)
+        names = [effect.id for effect in known]
     if not names:
         return model, []
-    extended, added = extended_model(model, names, [fitted])
+    extended, added = extended_model(model, names, [fitted], known)
     metrics = measure(extended, force, force_trials, length, length_trials)
     # The errors of loads left out of the last fit of the weights stay with the new ones.
     for name, entry in metrics.items():
@@ -85,32 +87,41 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     return dataclasses.replace(extended, metrics=metrics), added
 
 
-def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measurement) -> list[str]:
+def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
+                    ) -> list[Effect]:
     """
-    Name the effects found, and those that every loaded muscle has where they do no harm.
+    Return the effects found, and those that every loaded muscle has where they do no harm.
 
     Constant loads on a bench hardly tell the wire's own elasticity from the growth of its stroke,
     and few rows may not prove either; but on an arm the load moves while the wire does. What is
-    known beforehand needs no proof against chance, only held-out rows that do not speak against it.
+    known beforehand needs no proof against chance, only rows that determine its parameters, be it
+    those that are held out, and that do not speak against it.
     """
-    fitter = BenchFitter(BenchProblem(model, [fitted]))
+    fitter = BenchFitter(BenchProblem(model, [fitted]).finer())
     names = [effect.id for effect in found]
     rest = usual([kind(model.surroundings) for name, kind in catalogue().items()
                   if kind.universal and name not in names and kind.available(model.surroundings)],
                  'bench')
     if not rest:
-        return names
+        return list(found)
 
-    def held_out(effects: Sequence[Effect]) -> float:
+    def tried(effects: Sequence[Effect]) -> tuple[float, list[Effect]]:
         fit = fitter.fit(effects)
-        if fit.implausible():
-            return np.inf
-        return fitter.error(fitter.cross_validate(fit).held_out)
+        fitted_effects = fitter.with_intervals(fit)
+        vague = [one for one in fitted_effects[len(found):] if undetermined(one, 'bench')]
+        # Where no effect explains the load, held-out loads would tell of what is missing.
+        if fit.implausible() or len(vague) > (1 if found else 0):
+            return np.inf, fitted_effects
+        if vague:
+            others = [one for one in fit.effects if one.id != vague[0].id]
+            return located(fitter, others, vague[0], practical) or (np.inf, fitted_effects)
+        return fitter.error(fitter.cross_validate(fit).held_out), fitted_effects
 
     # Alone they have to help; together with one that was found they only must not harm.
     practical = Settings().practical
-    largest = held_out(found) * ((1.0 + practical) if names else (1.0 - practical))
+    largest = tried(found)[0] * ((1.0 + practical) if names else (1.0 - practical))
     for more in (rest, *([effect] for effect in rest)):
-        if held_out([*found, *more]) <= largest:
-            return [*names, *(effect.id for effect in more)]
-    return names
+        error, effects = tried([*found, *more])
+        if error <= largest:
+            return effects
+    return list(found)

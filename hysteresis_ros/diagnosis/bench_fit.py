@@ -27,6 +27,9 @@ FOLLOWED_STARTS, WORTH_FOLLOWING, FIRST_EVALUATIONS = 2, 2.0, 4
 SAME = 9
 MOST_EVALUATIONS, HELD_OUT_EVALUATIONS = 8, 3
 TOLERANCE = 1e-3
+# A parameter whose whole unit moves the response by less than this share of its spread (rms), once
+# the weights have followed, is not determined.
+UNDETERMINED = 1e-5
 
 
 class Response:
@@ -156,13 +159,25 @@ class BenchFitter:
         """
         starts = starts_of(effect, self.problem.kind, self.problem.measured)
         others = [*unaffected(self.fixed, [*known, starts[0]]), *known]
-        errors = [self.error(self.problem.simulate([*others, start])) ** 2 for start in starts]
+        followed = self._worth_following(
+            [[*others, start] for start in starts], 1 if known else FOLLOWED_STARTS)
+        return self.best_of([[*known, starts[index]] for index in followed])
+
+    def begin(self, starts: Sequence[Sequence[Effect]]) -> Fit:
+        """Follow the best of several starts, each a list of effects, for a few steps."""
+        tried = [[*unaffected(self.fixed, effects), *effects] for effects in starts]
+        return min((self.fit(starts[index], FIRST_EVALUATIONS)
+                    for index in self._worth_following(tried, FOLLOWED_STARTS)),
+                   key=lambda fit: self.error(fit.predicted))
+
+    def _worth_following(self, sets: Sequence[Sequence[Effect]], most: int) -> list[int]:
+        """Return which sets of all effects of the model begin with the least errors."""
+        errors = [self.error(self.problem.simulate(effects)) ** 2 for effects in sets]
         # Starts without any effect, such as stops out of reach, all have the same error.
         spread = max(float(np.var(self.problem.measured)), 1e-300)
         _, order = np.unique(np.round(np.array(errors) / spread, SAME), return_index=True)
-        followed = [starts[index] for index in order[:1 if known else FOLLOWED_STARTS]
-                    if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
-        return self.best_of([[*known, start] for start in followed])
+        return [int(index) for index in order[:most]
+                if index == order[0] or errors[index] <= WORTH_FOLLOWING * min(errors)]
 
     def best_of(self, starts: Sequence[Sequence[Effect]]) -> Fit:
         """Follow several starts, each a list of effects, for a few steps, and fit the best."""
@@ -181,10 +196,10 @@ class BenchFitter:
 
     def cross_validate(self, fit: Fit) -> Fit:
         """Return a fit with the response of every row as predicted by a fit to the other folds."""
-        held_out = np.empty(len(self.problem.measured))
-        for fold in self.problem.folds:
-            test = self.problem.fold == fold
-            response = Response(self.problem, self.fixed, fit.effects, ~test)
+        problem, held_out = self.problem.holding_out(), np.empty(len(self.problem.measured))
+        for fold in problem.folds:
+            test = problem.fold == fold
+            response = Response(problem, self.fixed, fit.effects, ~test)
             vector = response.minimise(fit.vector, HELD_OUT_EVALUATIONS, TOLERANCE)
             held_out[test] = response.predicted(vector)[test]
         return dataclasses.replace(fit, held_out=held_out)
@@ -201,7 +216,13 @@ class BenchFitter:
             return fit.effects
         jacobian = fit.jacobian
         error = self.problem.measured - fit.predicted
-        inverse = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-10)
+        size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+        normal = (jacobian / size).T @ (jacobian / size)
+        inverse = np.linalg.pinv(normal, rcond=1e-10)
+        # What the rows do not determine at all has no end, instead of no width.
+        free = 1.0 - np.diag(inverse @ normal) > 0.5
+        free |= size <= UNDETERMINED * float(np.std(self.problem.measured)) * np.sqrt(len(error))
+        inverse = inverse / np.outer(size, size)
         scores = np.stack([jacobian[rows].T @ error[rows] for rows in (
             self.problem.block == block for block in np.unique(self.problem.block))])
         count = len(scores)
@@ -209,4 +230,5 @@ class BenchFitter:
         covariance = count / freedom * inverse @ (scores.T @ scores) @ inverse
         half = special.stdtrit(freedom, 0.5 + level / 2.0) * np.sqrt(
             np.maximum(np.diag(covariance), 0.0))
+        half[free] = np.inf
         return parameters.with_intervals(fit.vector, half)

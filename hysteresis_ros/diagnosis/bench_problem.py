@@ -10,7 +10,9 @@ fitted to the rows that are not held out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import copy
 import dataclasses
+import functools
 from typing import Any, Literal, TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -22,6 +24,7 @@ from hysteresis_ros.identification.bench import left_out
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
 from hysteresis_ros.identification.operators import smoothness
 from hysteresis_ros.identification.projection import ProjectedWeights
+from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.kernels.shares import shares
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.operators import Preisach, cell_areas
@@ -37,7 +40,10 @@ Entry = TypeVar('Entry')
 
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
 # the solution is unique. More of it bends the effects' own parameters.
-SEARCH_STRENGTH = 1e-8
+SEARCH_STRENGTH = 3e-9
+# The same for weights that predict rows held out: more of it widens a steep loop, which under a
+# load that was not fitted counts as the error of the effects.
+HELD_OUT_STRENGTH = 1e-9
 # Courses that are remembered, those of the latest effects.
 MOST_COURSES = 20
 # How often weights and the martensite share that they show are fitted to each other.
@@ -46,6 +52,11 @@ PHASE_PASSES = 2
 WORTH = 0.02
 # How much finer than the model's the grid of H2 may be once its effects are known.
 FINER = 1.0, 1.5, 2.0
+# Share of the range of the loads by which two that count as the same may differ.
+SAME_LOAD = 0.02
+# How much finer it is where sets of effects are judged: cells as wide as a loop take up what an
+# effect does to its width, and bend the effect's parameters.
+JUDGED = 2
 
 
 @dataclasses.dataclass
@@ -155,7 +166,7 @@ class BenchProblem(Problem):
             raise MeasurementError(f'effects on bench tables need a Preisach length stage, this '
                                    f'model has a {stage.kind} one; identify it with --operator '
                                    'two-stage or preisach')
-        self.levels = len(stage.nodes) - 1
+        self.levels = self._levels_of_model = len(stage.nodes) - 1
         self._trials = [trial for simulator in self.simulators for trial in simulator.trials]
         counts = np.array([len(trial.drive) for trial in self._trials])
         # Before its first row each trial has the cold one, with that row's load.
@@ -170,12 +181,42 @@ class BenchProblem(Problem):
         self._wanted[self._judged + np.repeat(np.arange(1, len(counts) + 1), counts)[
             self._judged]] = True
         self._surroundings = model.surroundings
+        self._strength = SEARCH_STRENGTH
+        self._forget()
+
+    def _forget(self) -> None:
+        """Begin without anything that was computed before."""
+        self._holding_out: BenchProblem | None = None
         self._passive: dict[bytes | None, np.ndarray] = {}
         self._courses: dict[tuple, Course] = {}
         self._excitations: dict[tuple, Excitation] = {}
         self._square: np.ndarray | None = None
         self._phases_of: tuple | None = None
         self._known_phases: list[np.ndarray] = []
+
+    def finer(self) -> BenchProblem:
+        """Return the same rows with H2 on the grid on which sets of effects are judged."""
+        other = copy.copy(self)
+        other.levels = JUDGED * self._levels_of_model
+        other._forget()
+        return other
+
+    def holding_out(self) -> BenchProblem:
+        """Return the same rows and grid, with weights regularised as for rows held out."""
+        if self._holding_out is None:
+            other = copy.copy(self)
+            other._strength = HELD_OUT_STRENGTH
+            other._forget()
+            self._holding_out = other
+        return self._holding_out
+
+    @functools.cached_property
+    def loads_return(self) -> bool:
+        """Whether a load comes back after another one, so that use can be told from load."""
+        loads = np.array([np.mean(trial.load) for trial in self._trials])
+        loads = np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
+        kinds = len(np.unique(loads))
+        return kinds == 1 or 1 + np.count_nonzero(np.diff(loads)) > kinds
 
     def _design(self, effects: Sequence[Effect], levels: int | None = None,
                 train: np.ndarray | None = None, phases: list[np.ndarray] | None = None,
@@ -217,14 +258,18 @@ class BenchProblem(Problem):
     def _excitation(self, chain: Chain, squared: np.ndarray) -> Excitation:
         """Return what H2 is given for the drive squared of all trials, shape (rows + trials,)."""
         inside = chain.load_inside(self._load)
-        key = squared.tobytes(), inside.tobytes(), chain.load_per_drive_squared()
+        width = chain.loop_width(self._load)
+        key = (squared.tobytes(), inside.tobytes(), width.tobytes(),
+               chain.load_per_drive_squared())
         if key not in self._excitations:
             first = self.model.first_stage(chain)
             x = self._first(first, squared)
             if first.loaded:
                 x -= inside[self._felt]
-            _remember(self._excitations, key,
-                      Excitation(self.model.sign * x, self._ends, self._wanted))
+            given = self.model.sign * x
+            if first.loaded and chain.plays:
+                given = follow(given, width[self._felt], self._ends)
+            _remember(self._excitations, key, Excitation(given, self._ends, self._wanted))
         return self._excitations[key]
 
     def _first(self, first: FirstStage, squared: np.ndarray) -> np.ndarray:
@@ -359,10 +404,9 @@ class BenchProblem(Problem):
         return found
 
     def _penalty(self, nodes: np.ndarray) -> np.ndarray:
-        """Square of the penalty; it is the same for all grids of equal intervals."""
+        """Return the square of the penalty, shape (K + 1, K + 1)."""
         if self._square is None:
-            root = smoothness(nodes, reversible=True)
-            self._square = np.pad(SEARCH_STRENGTH * root.T @ root, (0, 1))
+            self._square = self._strength * _square(len(nodes) - 1)
         return self._square
 
     def _sensed(self, effect: SensorEffect, response: np.ndarray) -> np.ndarray:
@@ -387,10 +431,9 @@ class BenchProblem(Problem):
         """
         best: tuple[WeightFit, Design] | None = None
         for factor in FINER:
-            fit, design = self.fit_stage(effects, round(factor * self.levels))
-            if best is not None and fit.held_out_rmse > (1.0 - WORTH) * best[0].held_out_rmse:
-                break
-            best = fit, design
+            fit, design = self.fit_stage(effects, round(factor * self._levels_of_model))
+            if best is None or fit.held_out_rmse < (1.0 - WORTH) * best[0].held_out_rmse:
+                best = fit, design
         assert best is not None     # there is at least one factor
         fit, design = best
         stage = _stage(design.nodes, fit.weights, fit.bias)
@@ -398,6 +441,13 @@ class BenchProblem(Problem):
         metrics['length'] = {**metrics.get('length', {}), **left_out(fit, self.trial)}
         return dataclasses.replace(
             self.model, effects=list(effects), length_stage=stage, metrics=metrics)
+
+
+@functools.lru_cache(maxsize=4)
+def _square(levels: int) -> np.ndarray:
+    """Return the square of the penalty's root; it is the same for all grids of equal intervals."""
+    root = smoothness(np.linspace(0.0, 1.0, levels + 1), reversible=True)
+    return np.pad(root.T @ root, (0, 1))
 
 
 def _remember(found: dict[tuple, Entry], key: tuple, value: Entry) -> None:

@@ -10,8 +10,7 @@ nor its weights have seen takes the evidence's place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-import itertools
+from collections.abc import Callable, Mapping, Sequence
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -20,9 +19,11 @@ import numpy as np
 from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.extend import undetermined
 from hysteresis_ros.diagnosis.observable import observable, present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.effects import catalogue, Effect
+from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.workers import delayed, in_parallel
 
 if TYPE_CHECKING:
@@ -31,10 +32,16 @@ if TYPE_CHECKING:
     from hysteresis_ros.workers import Progress
 
 SIGNIFICANCE = 0.05
-# Share of blocks in which an effect has to help.
+# Share of the gains and losses in all blocks that has to be gains.
 CONSISTENT = 0.55
-# Effects of which all sets are tried.
-MOST_IN_SETS = 5
+# Share of the response's range below which an error does not matter.
+SMALL_ERROR = 0.01
+# Sets of each size that are grown by one more effect, and judged on held-out rows.
+GROWN = 3
+# Share by which an effect has to lower the error of the rows that its set is fitted to.
+WORTH_JUDGING = 0.01
+# Share of the loads on which an effect has to be named again with that load left out.
+NAMED_AGAIN = 0.5
 
 
 class BenchSelection:
@@ -44,6 +51,7 @@ class BenchSelection:
     Parameters
     ----------
     problem : BenchProblem
+        Sets are found on it, and judged on the same rows with H2 on a finer grid.
     settings : Settings
     rng : numpy.random.Generator
     jobs : int
@@ -52,6 +60,8 @@ class BenchSelection:
 
     Attributes
     ----------
+    problem : BenchProblem
+        On which sets are judged.
     base : Fit
         Without any further effect.
     found : Fit
@@ -64,29 +74,29 @@ class BenchSelection:
         Of every set that was tried, by its names; family-wise.
     unobservable : dict of str to str
         Effects that this data cannot show, with the reason.
+    unstable : dict of str to str
+        Effects that explain something, but not on most loads or with no certain value, with that
+        reason.
     """
 
     def __init__(self, problem: BenchProblem, settings: Settings, rng: np.random.Generator,
                  jobs: int, progress: Progress) -> None:
-        self.problem, self.settings = problem, settings
-        self.fitter = BenchFitter(problem)
+        self.problem, self.settings = problem.finer(), settings
+        self._search, self.fitter = BenchFitter(problem), BenchFitter(self.problem)
         self._rng, self._jobs, self._progress = rng, jobs, progress
         self.base = self.found = self.fitter.cross_validate(self.fitter.fit([]))
         self.names, self.unobservable = observable(problem)
+        self.unstable: dict[str, str] = {}
         self.alone: list[Fit] = []
         self.sets: list[Fit] = []
         self.tried: list[Fit] = []
         self.p_values: dict[tuple[str, ...], float] = {}
 
     def run(self) -> None:
-        """Fit every effect by itself, and all sets of the best few."""
-        self.alone = self._in_parallel(_alone, self.names)
-        self.alone.sort(key=self.error)
-        few = [fit.effects[0] for fit in self.alone[:MOST_IN_SETS]]
-        # An effect need not help by itself: the paper's first stage already does a part of what
-        # a load does, so that one effect of the load alone may well make it worse.
-        larger = [one for one in subsets(few, self.settings.most_effects) if len(one) > 1]
-        self.tried = [*self.alone, *self._in_parallel(_together, larger)]
+        """Fit every effect by itself, grow sets from the best, and compare what they predict."""
+        grown = self._grown()
+        self.tried = self._in_parallel(_judged, self.fitter, [fit.effects for fit in grown])
+        self.alone = sorted((fit for fit in self.tried if len(fit.effects) == 1), key=self.error)
         values = self._significance(self.tried)
         self.p_values = {fit.names: float(value) for fit, value in zip(self.tried, values)}
         self.sets = [fit for fit, value in zip(self.tried, values)
@@ -98,22 +108,118 @@ class BenchSelection:
                      if self.error(fit) <= (1.0 + self.settings.practical) * best]
         self.found = min(near_best, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.error(fit)))
+        self._keep_stable()
+        self._keep_determined()
 
-    def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None],
+    def _grown(self) -> list[Fit]:
+        """
+        Return all single effects and the best larger sets, fitted, not cross-validated.
+
+        An effect need not help by itself: the paper's first stage already does a part of what a
+        load does, so that one effect of the load alone may well make it worse. What every loaded
+        muscle has is therefore grown from, too.
+        """
+        singles = self._in_parallel(_alone, self._search, self.names)
+        found = list(singles)
+        single = {fit.names[0]: fit.effects[0] for fit in singles}
+        generation = self._best(singles, GROWN)
+        errors = {frozenset(fit.names): self._fitted_error(fit) for fit in singles}
+        for _ in range(1, self.settings.most_on_bench):
+            larger = {frozenset((*fit.names, name)): [*fit.effects, effect]
+                      for fit in generation for name, effect in single.items()
+                      if name not in fit.names}
+            begun = self._in_parallel(_begun, self._search, [
+                effects for effects in larger.values() if not _replaced(effects)])
+            generation = self._best(self._in_parallel(_fitted, self._search, [
+                fit.effects for fit in self._best(begun, 2 * GROWN)]), GROWN)
+            errors.update((frozenset(fit.names), self._fitted_error(fit)) for fit in generation)
+            found += [fit for fit in generation if self._all_help(fit, errors)]
+        return found
+
+    def _best(self, fits: Sequence[Fit], count: int) -> list[Fit]:
+        """Return those with the least errors of fitted rows, and those of universal effects."""
+        order = sorted(fits, key=self._fitted_error)
+        return order[:count] + [fit for fit in order[count:]
+                                if all(effect.universal for effect in fit.effects)]
+
+    def _all_help(self, fit: Fit, errors: Mapping[frozenset[str], float]) -> bool:
+        """
+        Whether no effect can be left out of a set at no cost.
+
+        Without what takes the first stage's place, the rest would be no part of the set.
+        """
+        largest = (1.0 - WORTH_JUDGING) * np.array([
+            errors.get(frozenset(fit.names) - {effect.id}, np.inf) for effect in fit.effects
+            if not (isinstance(effect, MaterialEffect) and effect.load_per_drive_squared > 0.0)])
+        return bool(np.all(self._fitted_error(fit) <= largest))
+
+    def _fitted_error(self, fit: Fit) -> float:
+        return self._search.error(fit.predicted)
+
+    def _keep_stable(self) -> None:
+        """
+        Leave out, one after the other, effects that are not named again without some load.
+
+        With a load left out, an effect is named again if the best set with it predicts that load
+        better than the best set without it, where both were fitted to the other loads.
+        """
+        while self.found.effects:
+            without = {name: self._best_without(name) for name in self.found.names}
+            share = {name: self._named_again(other) for name, other in without.items()}
+            name = min(share, key=lambda one: share[one])
+            if share[name] > NAMED_AGAIN:
+                return
+            self._leave_out(name, f'with one load left out it is named again on '
+                            f'{100.0 * share[name]:.0f} % of them', without[name])
+
+    def _keep_determined(self) -> None:
+        """Leave out effects whose size the rows do not determine, but for what is usual."""
+        for effect in self.fitter.with_intervals(self.found):
+            size = f'{effect.id}.{effect.parameters[0].name} '
+            notes = [note for note in undetermined(effect, self.problem.kind) if size in note]
+            if notes and not effect.universal and effect.id in self.found.names:
+                self._leave_out(effect.id, notes[0], self._best_without(effect.id))
+
+    def _leave_out(self, name: str, reason: str, instead: Fit) -> None:
+        experiment = catalogue()[name].experiment
+        self.unstable[name] = f'cannot be determined here: {reason}; it would be by: {experiment}'
+        self.found = instead
+
+    def _best_without(self, name: str) -> Fit:
+        """Return the best set that lacks an effect."""
+        return min((fit for fit in [self.base, *self.sets] if name not in fit.names),
+                   key=self.error)
+
+    def _named_again(self, other: Fit) -> float:
+        """Return the share of folds that the set found predicts better than another one."""
+        squares = [np.bincount(self.problem.fold, weights=(
+            self.problem.measured - fit.held_out) ** 2) for fit in (self.found, other)]
+        return float(np.mean(squares[0] < squares[1]))
+
+    def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None], fitter: BenchFitter,
                      items: Sequence) -> list[Fit]:
-        tasks = [delayed(task)(self.fitter, item) for item in items]
+        tasks = [delayed(task)(fitter, item) for item in items]
         results = self._progress(in_parallel(tasks, self._jobs), len(tasks))
-        fits = [fit for fit in results if fit is not None]
-        return [fit for fit in fits if np.all(np.isfinite(fit.held_out))]
+        return [fit for fit in results if fit is not None]
 
     def error(self, fit: Fit) -> float:
         """Return the held-out RMSE of a fit, in the unit of the response."""
         return self.fitter.error(fit.held_out)
 
     def _gains(self, fit: Fit) -> np.ndarray:
-        """Return the reduction of the squared error in each block."""
-        before, after = (self.problem.measured - one.held_out for one in (self.base, fit))
-        return significance.block_sums(before ** 2 - after ** 2, self.problem.block)
+        """
+        Return the reduction of the squared error in each block, over the error there.
+
+        Of fitted rows: a load that is held out has its errors in few places, so that blocks say
+        little of chance. The shares are from -1 to 1, or the worst block would decide alone; and
+        errors too small to matter, as where the muscle is at one of its ends, count as none.
+        """
+        before, after = (significance.block_sums(
+            (self.problem.measured - one.predicted) ** 2, self.problem.block)
+            for one in (self.base, fit))
+        small = max(self.problem.noise, SMALL_ERROR * float(np.ptp(self.problem.measured)))
+        return (before - after) / (
+            before + after + small ** 2 * np.bincount(self.problem.block))
 
     def _significance(self, fits: Sequence[Fit]) -> np.ndarray:
         if not fits:
@@ -122,9 +228,10 @@ class BenchSelection:
             np.stack([self._gains(fit) for fit in fits]), self._rng, self.settings.draws)
 
     def _helps(self, fit: Fit) -> bool:
-        """Whether a fit explains enough to matter, in most blocks."""
+        """Whether a fit explains enough of held-out rows to matter, and helps in most blocks."""
+        gains = self._gains(fit)
         return bool(self.error(fit) <= (1.0 - self.settings.practical) * self.error(self.base)
-                    and np.mean(self._gains(fit) > 0.0) >= CONSISTENT)
+                    and np.sum(gains[gains > 0.0]) >= CONSISTENT * np.sum(np.abs(gains)))
 
     def could_be(self, rival: Fit) -> bool:
         """Whether a rival could be the truth although the set found is better."""
@@ -164,29 +271,44 @@ class BenchSelection:
         return list(zip(fits, (weights / weights.sum()).tolist()))
 
 
-def subsets(effects: Sequence[Effect], most: int) -> list[list[Effect]]:
-    """Return every set of at most `most` of the effects in which none replaces another."""
-    return [list(subset) for size in range(1, most + 1)
-            for subset in itertools.combinations(effects, size)
-            if not any(other.id in effect.replaces for effect in subset for other in subset)]
+def _replaced(effects: Sequence[Effect]) -> bool:
+    """Whether one of some effects replaces another one."""
+    return any(other.id in effect.replaces for effect in effects for other in effects)
 
 
 def _alone(fitter: BenchFitter, name: str) -> Fit | None:
-    """Fit and cross-validate one effect."""
+    """Fit one effect."""
     effect = present(fitter.problem.model, catalogue()[name])
+    if not fitter.problem.loads_return:
+        effect = effect.within_trials()
     with np.errstate(all='ignore'):
-        return _finite(fitter, lambda: fitter.search([], effect))
+        return _finite(fitter.search([], effect))
 
 
-def _together(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
-    """Fit and cross-validate some effects, from usual values and from those that each had."""
+def _begun(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
+    """Begin to fit effects, the last of them new, from usual values or those that each had."""
+    kind = fitter.problem.kind
     with np.errstate(all='ignore'):
-        return _finite(fitter, lambda: fitter.best_of(
-            [usual(effects, fitter.problem.kind), effects]))
+        return _finite(fitter.begin([
+            usual(effects, kind), effects, [*effects[:-1], *usual(effects[-1:], kind)]]))
 
 
-def _finite(fitter: BenchFitter, make: Callable[[], Fit]) -> Fit | None:
-    fit = make()
-    if not np.all(np.isfinite(fit.predicted)) or not np.all(np.isfinite(fit.jacobian)):
-        return None
-    return fitter.cross_validate(fit)
+def _fitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
+    """Fit some effects from their present values."""
+    with np.errstate(all='ignore'):
+        return _finite(fitter.fit(effects))
+
+
+def _judged(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
+    """Fit some effects from their present values, and cross-validate the fit."""
+    with np.errstate(all='ignore'):
+        fit = _fitted(fitter, effects)
+        if fit is None:
+            return None
+        fit = fitter.cross_validate(fit)
+        return fit if np.all(np.isfinite(fit.held_out)) else None
+
+
+def _finite(fit: Fit) -> Fit | None:
+    finite = np.all(np.isfinite(fit.predicted)) and np.all(np.isfinite(fit.jacobian))
+    return fit if finite else None

@@ -64,15 +64,16 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
     kind = ('unknown' if unknown else 'missing' if missing else
             'not_excited' if not selection.alone and selection.unobservable else 'adequate')
     named = [alternatives[name] for name in missing]
+    hidden = {**selection.unstable, **selection.unobservable}
     return verdict.Diagnosis(
         verdict=kind, missing=missing, alternatives=named,
         ranking=_ranking(selection, missing, rng), sets=_sets(selection, unknown),
         noise_floor=problem.noise, structural_error=0.0,
         unexplained=float(np.clip(unexplained, 0.0, 1.0)),
         experiment=verdict.next_experiment(
-            kind, missing or resembles, named, selection.unobservable),
+            kind, missing or resembles, named, hidden),
         effects=effects, rmse_before=before, rmse_after=after,
-        not_excited=selection.unobservable, event=None,
+        not_excited=hidden, event=None,
         signal=unexplained_signal(problem, residual) if unknown else '', resembles=resembles)
 
 

@@ -220,15 +220,26 @@ def _gained(model: MuscleModel, problem: ArmProblem | BenchProblem,
 
 
 @one_blas_thread()
-def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]
-                   ) -> tuple[MuscleModel, list[Effect]]:
+def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],
+                   known: Sequence[Effect] = ()) -> tuple[MuscleModel, list[Effect]]:
     """
     Return the extended model and the effects added; `extend` also says what each of them gained.
 
-    The parameters, and what is raised, are those of `extend`.
+    The parameters, and what is raised, are those of `extend`; `known` are effects of these names
+    that a diagnosis of the same bench has fitted before.
     """
     problem, _, fits = _fitted(model, names, train)
     added, _ = fits[-1]
+    if known and problem.refits:
+        fitter = BenchFitter(problem.finer())
+        rivals = [fitter.fit(effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
+                  for effects in (known, added)]
+        added = fitter.with_intervals(min(rivals, key=lambda fit: (
+            len(fit.implausible()), fitter.error(fit.predicted))))
+        vague = {effect.id for effect in added if undetermined(effect, problem.kind)}
+        if any(effect.id in vague and not undetermined(effect, problem.kind) for effect in known):
+            # What only held-out rows have determined is not fitted again.
+            added = list(known)
     completed = problem.completed([*problem.model.effects, *added])
     return _stamped(completed, added, train, problem.kind), added
 
@@ -306,7 +317,7 @@ def _checked(problem: ArmProblem | BenchProblem, names: Iterable[str]) -> list[t
 def _on_bench(problem: BenchProblem, model: MuscleModel, classes: Sequence[type[Effect]]
               ) -> list[Fitted]:
     """Fit effects one after the other, each with those before; the weights are refitted."""
-    fitter = BenchFitter(problem)
+    fitter = BenchFitter(problem.finer())
     known: list[Effect] = []
     found: list[Fitted] = []
     for number, kind in enumerate(classes, 1):

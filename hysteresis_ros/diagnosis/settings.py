@@ -18,6 +18,8 @@ class Settings:
         Probability of each effect beforehand: about one of a catalogue of thirty.
     most_effects : int
         Effects in one set; more are not told apart by one recording.
+    most_on_bench : int
+        The same for a bench, whose loads tell more of them apart.
     beam : int
         Sets from which larger ones are grown.
     refits : int
@@ -48,6 +50,7 @@ class Settings:
 
     prior: float = 0.03
     most_effects: int = 3
+    most_on_bench: int = 4
     beam: int = 3
     refits: int = 6
     scale_spread: float = 0.3

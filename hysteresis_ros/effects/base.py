@@ -255,6 +255,10 @@ class Effect(abc.ABC):
                    'high': self.intervals.get(name, (value, value))[1], 'unit': units[name]}
             for name, value in self.values.items()}}
 
+    def within_trials(self) -> 'Effect':
+        """Return the effect without what it would carry from one trial to the next."""
+        return self
+
     def guesses(self, measured: np.ndarray) -> list[dict]:
         """Return values by name that the measured response (n,) suggests to start a fit from."""
         return []

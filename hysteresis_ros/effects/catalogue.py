@@ -6,7 +6,8 @@ import functools
 import inspect
 from importlib import metadata
 
-from hysteresis_ros.effects import electrical, material, mechanism, sensor, thermal
+from hysteresis_ros.effects import (
+    electrical, material, mechanism, sensor, thermal, transformation_slopes)
 from hysteresis_ros.effects.base import Effect, STAGES
 from hysteresis_ros.effects.stages import (
     DriveEffect, MaterialEffect, MechanismEffect, SensorEffect)
@@ -22,7 +23,7 @@ DESCRIPTION = ('id', 'stage', 'sentence', 'equation', 'source', 'shows_in', 'exp
 
 def _own() -> list[type[Effect]]:
     found = []
-    for module in (electrical, thermal, material, mechanism, sensor):
+    for module in (electrical, thermal, material, transformation_slopes, mechanism, sensor):
         found += [member for member in vars(module).values()
                   if inspect.isclass(member) and issubclass(member, Effect)
                   and member.__module__ == module.__name__ and 'id' in vars(member)]

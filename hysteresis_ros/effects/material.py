@@ -7,15 +7,20 @@ Those of the load (`stress_dependence`, `stress_dependent_strain`, `series_compl
 what a bench measures, so adding them on bench tables refits the weights of H2.
 """
 
+import dataclasses
 import math
 from typing import ClassVar
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.base import Effect, Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.kernels.creep import fade, relax
 from hysteresis_ros.kernels.play import follow
+
+
+# Drives that make a muscle hot.
+HEATING = ('voltage', 'current', 'power', 'temperature')
 
 
 class StressDependence(MaterialEffect):
@@ -185,6 +190,11 @@ class RPhase(MaterialEffect):
 
     memory = ('_played',)
 
+    @classmethod
+    def available(cls, surroundings: Surroundings) -> bool:
+        """Whether the drive heats: pressure transforms nothing."""
+        return surroundings.drive in HEATING
+
     # Width w of the step's own hysteresis over the largest drive squared.
     LOOP = 0.03
 
@@ -338,9 +348,11 @@ class Fatigue(MaterialEffect):
     """Cycle after cycle the muscle gets shorter, or longer, and loses stroke."""
 
     id = 'fatigue'
-    sentence = 'With every cycle the muscle gets a little shorter, or longer, and loses stroke.'
-    equation = 'L -= b l0 ln(1 + N), stroke times (1 - a ln(1 + N)), N the number of cycles'
-    source = 'functional fatigue of shape memory alloys'
+    sentence = ('With every cycle the muscle gets a little shorter (b > 0) or longer (b < 0), and '
+                'loses stroke.')
+    equation = ('L -= b l0 w, stroke times (1 - a w), w = ln(1 + N / N0), N the cycles of the '
+                'recording: ln(1 + (N + Nb) / N1) against its start, N0 = N1 + Nb')
+    source = 'functional fatigue and training of shape memory alloys'
     shows_in = 'cycle count'
     experiment = 'repeat a reference loop and compare the first with the last'
     confused_with = ('ambient_drift',)
@@ -351,6 +363,9 @@ class Fatigue(MaterialEffect):
                   (0.05, -0.05), both_signs=True),
         Parameter('a', '1', 'loss of stroke per factor e of the number of cycles', 0.0, 0.3, 0.0,
                   (0.03,)),
+        Parameter('N0', '1', 'cycles before the recording, and those of the first wear: an old '
+                  'muscle wears more slowly than a new one', 1.0, 1e5, 1.0, (1.0,), log=True,
+                  limits=(1.0, 1e5), kinds=()),
         Parameter('kept', '1', '1: what earlier trials have worn stays; 0: every trial begins '
                   'anew, as with another specimen or one that recovers', 0.0, 1.0, 1.0, (1.0, 0.0),
                   choices=(1.0, 0.0), kinds=('bench',)))
@@ -378,8 +393,21 @@ class Fatigue(MaterialEffect):
         begun = 0.0 if self.kept else inputs.cycles[0]
         return self._worn(inputs.cycles - begun, surroundings)
 
+    def within_trials(self) -> Effect:
+        """
+        Return the effect with every trial beginning anew.
+
+        Where each load has one trial, what use would carry over cannot be told from the load.
+        """
+        kept = next(parameter for parameter in self.parameters if parameter.name == 'kept')
+        other = self.with_values(kept=0.0)
+        other.parameters = tuple(
+            dataclasses.replace(parameter, choices=(0.0,)) if parameter is kept else parameter
+            for parameter in self.parameters)
+        return other
+
     def _worn(self, cycles: Values, surroundings: Surroundings) -> tuple[Values, Values]:
-        logarithm = np.log1p(cycles)
+        logarithm = np.log1p(cycles / self.N0)
         offset = -self.b / 100.0 * surroundings.length * logarithm
         return offset, np.maximum(1.0 - self.a * logarithm, 0.1)
 

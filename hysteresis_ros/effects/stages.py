@@ -69,8 +69,9 @@ class MaterialEffect(Effect):
     Effect on the muscle's relation ``L = L0 + S(F) f (H2[s (x - c F)] - L0) + e(F) + o``.
 
     The transformation is H2 of the drive x shifted by the load F; S scales its strain, e is what
-    the load alone stretches, f and o are what time and use do. Each method has a neutral default.
-    Loads are per muscle, scalars or arrays.
+    the load alone stretches, f and o are what time and use do. The loop may be wider by w(F) than
+    that of H2: see `kernels.load_play`. Each method has a neutral default. Loads are per muscle,
+    scalars or arrays.
     """
 
     stage = 'material'
@@ -81,6 +82,10 @@ class MaterialEffect(Effect):
 
     def shift_load(self, load: Values, surroundings: Surroundings) -> Values:
         """Return what is added to the load inside the transformation, in units of the load."""
+        return 0.0 * load
+
+    def loop_width(self, load: Values, surroundings: Surroundings) -> Values:
+        """Return w, by which the loop is wider than that of H2, in units of the load."""
         return 0.0 * load
 
     def scale(self, load: Values, surroundings: Surroundings) -> Values:

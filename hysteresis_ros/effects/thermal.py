@@ -22,6 +22,9 @@ from hysteresis_ros.kernels.lag import lag
 
 # A rate [1/s] that stands for one without bound, which times no time would be no number.
 FASTEST = 1e12
+# Time constants [s] of muscles, from a thin wire in water to a thick one in still air, a polymer
+# thread or a long bladder behind a small valve.
+LAGS = 0.05, 100.0
 
 
 class ThermalEffect(DriveEffect):
@@ -167,8 +170,8 @@ class ThermalLag(FirstOrderLag):
     experiment = 'fast steps, and the same ramp at several rates'
     confused_with = ('latency', 'viscous_friction', 'creep')
     parameters = (
-        Parameter('time_constant', 's', 'time constant 1/d1 of Eq. 1', 1.0, 10.0, 0.0,
-                  (1.5, 6.0), log=True),)
+        Parameter('time_constant', 's', 'time constant 1/d1 of Eq. 1', *LAGS, 0.0,
+                  (0.3, 1.5, 6.0, 25.0), log=True),)
 
 
 class HeatingCoolingAsymmetry(FirstOrderLag):
@@ -183,8 +186,8 @@ class HeatingCoolingAsymmetry(FirstOrderLag):
     confused_with = ('thermal_lag',)
     replaces = ('thermal_lag',)
     parameters = (
-        Parameter('time_constant', 's', 'time constant while cooling', 1.0, 10.0, 0.0, (2.0, 5.0),
-                  log=True),
+        Parameter('time_constant', 's', 'time constant while cooling', *LAGS, 0.0,
+                  (0.5, 2.0, 5.0, 25.0), log=True),
         Parameter('ratio', '1', 'rate of heating over rate of cooling', 0.5, 2.0, 1.0, (0.7, 1.4),
                   log=True),)
 
@@ -206,8 +209,8 @@ class LatentHeat(FirstOrderLag):
     replaces = ('thermal_lag',)
     needs_phase = True
     parameters = (
-        Parameter('time_constant', 's', 'time constant 1/d1 outside the transformation', 1.0, 10.0,
-                  0.0, (2.0, 5.0), log=True),
+        Parameter('time_constant', 's', 'time constant 1/d1 outside the transformation', *LAGS,
+                  0.0, (0.5, 2.0, 5.0, 25.0), log=True),
         Parameter('latent', '1', 'h: latent heat over the heat stored at full drive', 0.05, 1.0,
                   0.0, (0.2, 0.5), log=True),)
 
@@ -261,11 +264,12 @@ class AmbientDrift(ThermalEffect):
     confused_with = ('fatigue', 'creep')
     invertible = False
     parameters = (
-        Parameter('offset', 'V^2', 'what the air at the start adds against the bench', 0.0, 20.0,
+        # A room differs by up to 20 K, of about 0.4 V^2 each, and settles within minutes.
+        Parameter('offset', 'V^2', 'what the air at the start adds against the bench', 0.0, 8.0,
                   0.0, (0.0,), both_signs=True),
-        Parameter('rate', 'V^2/10 min', 'change of that', 0.05, 20.0, 0.0, (-1.0, 1.0),
+        Parameter('rate', 'V^2/10 min', 'change of that', 0.05, 12.0, 0.0, (-1.0, 1.0),
                   both_signs=True),
-        Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.0, 20.0, 0.0, (0.0,),
+        Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.0, 8.0, 0.0, (0.0,),
                   both_signs=True),)
 
     CLOCK_UNIT = 600.0

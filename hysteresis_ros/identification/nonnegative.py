@@ -15,6 +15,10 @@ TOLERANCE = 1e-11
 # Share of the largest unknown below which a sign is rounding.
 ROUNDING = 1e-12
 SINGULAR = 1        # state of `pivot`
+# Unknowns that are tried at once, at least.
+FEWEST_MORE = 10
+# Share of unknowns off their bound from which on all are taken at once.
+MANY = 0.3
 NO_SOLUTION = 'least squares: the problem is singular; use a strength above 0'
 
 
@@ -60,6 +64,62 @@ def solve_nonnegative(
             'least squares: no solution found; use a larger strength or fewer levels')
     # The tolerance on signs is one of rounding: nothing below the bound is handed on.
     return np.where(free | (x > 0.0), x, 0.0), passive
+
+
+def solve_rows(design: np.ndarray, target: np.ndarray, penalty: np.ndarray, free: np.ndarray,
+               start: Optional[np.ndarray] = None) -> tuple:
+    """
+    Minimise ``|design @ x - target|^2 / n + x @ penalty @ x``, x >= 0 except where `free`.
+
+    Where few of many unknowns leave their bound, `solve_nonnegative` takes those of `start` and, as
+    long as there are any, those that would improve most on its result: of the square of `design`
+    only their part is computed.
+
+    Parameters
+    ----------
+    design : ndarray, shape (n, K)
+    target : ndarray, shape (n,)
+    penalty : ndarray, shape (K, K)
+        Symmetric positive definite, at least where `design` does not determine x.
+    free : ndarray of bool, shape (K,)
+        Unknowns without a bound.
+    start : ndarray of bool, shape (K,), optional
+        Unknowns that are probably not at their bound.
+
+    Returns
+    -------
+    x : ndarray, shape (K,)
+    passive : ndarray of bool, shape (K,)
+        Unknowns that are not at their bound.
+
+    Raises
+    ------
+    IdentificationError
+        As `solve_nonnegative`.
+    """
+    count = len(target)
+    moment = design.T @ target / count
+    tolerance = TOLERANCE * max(float(np.max(np.abs(moment))), 1e-300)
+    passive = free.copy() if start is None else (start | free)
+    tried = passive.copy()
+    if np.count_nonzero(passive) > MANY * len(free):
+        tried[:] = True
+    while True:
+        index = np.flatnonzero(tried)
+        part, curvature = design[:, index], penalty[index]
+        x, inside = solve_nonnegative(part.T @ part / count + curvature[:, index], moment[index],
+                                      free[index], passive[index])
+        gradient = (part @ x / count) @ design + x @ curvature - moment
+        gradient[tried] = 0.0
+        passive[index] = inside
+        better = np.flatnonzero(gradient < -tolerance)
+        if len(better) == 0:
+            found = np.zeros(len(free))
+            found[index] = x
+            return found, passive
+        most = max(len(index) // 2, FEWEST_MORE)
+        more = better[np.argsort(gradient[better])[:most]]
+        tried[more] = passive[more] = True
 
 
 def solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:

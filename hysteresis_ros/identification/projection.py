@@ -10,7 +10,7 @@ at their bound stay there, so that each takes one small linear problem instead o
 
 import numpy as np
 
-from hysteresis_ros.identification.nonnegative import solve, solve_nonnegative
+from hysteresis_ros.identification.nonnegative import solve, solve_rows
 
 
 class ProjectedWeights:
@@ -39,8 +39,7 @@ class ProjectedWeights:
                  start: np.ndarray | None = None):
         free = np.zeros(design.shape[1], dtype=bool)
         free[-1] = True
-        self.z, self.passive = solve_nonnegative(
-            design.T @ design / len(target) + penalty, design.T @ target / len(target), free, start)
+        self.z, self.passive = solve_rows(design, target, penalty, free, start)
         self.columns = np.flatnonzero(self.passive)
         self._penalty = penalty[np.ix_(self.columns, self.columns)]
 

@@ -17,13 +17,14 @@ from .lean import lean
 # Columns of `Arm.grid`: angle [rad], elongation [m], moment to be held [N m], moment arm times
 # number of muscles [m]. Then, for an arm at rest, one that sinks and one that rises against dry
 # friction: what the transformation has to give [m], without offset, which never falls; the load
-# that it feels; what a moment that resists motion takes off that load; and what an offset counts.
+# that it feels; what a moment that resists motion takes off that load; what an offset counts; and
+# by how much the loop is wider than that of H2.
 THETA, LENGTH, MOMENT, LEVERAGE = range(4)
-DEMAND, LOAD, RESIST, STRAIN = range(4, 8)
-LINE = 4
+DEMAND, LOAD, RESIST, STRAIN, WIDTH = range(4, 9)
+LINE = 5
 # Columns of `Arm.loads`, at loads that are equally far apart: the load as the transformation feels
-# it, factor on its strain, and elastic stretch [m].
-INSIDE, SCALE, STRETCH = range(3)
+# it, factor on its strain, elastic stretch [m], and by how much its loop is wider than that of H2.
+INSIDE, SCALE, STRETCH, LOOP = range(4)
 
 # Entries of `State.motion`: angle [rad], NaN before the first sample; velocity and acceleration;
 # dt, angle and velocity of the sample before, that dt NaN where there was none; x; whether
@@ -41,13 +42,14 @@ class Arm(NamedTuple):
     """
     Arm and parallel muscles, as tables.
 
-    `grid` (n, 8 or 16) and `loads` (m, 3) have the columns above; `spacing` [N] is that of the
+    `grid` (n, 9 or 19) and `loads` (m, 4) have the columns above; `spacing` [N] is that of the
     loads. `base` [m] is the least output of H2; `coulomb` [N m], `viscous` [N m s/rad] and
     `inertia` [kg m^2] resist motion; `tolerance` [N] is the load that may be missing at rest.
     `longest` [s] is the longest dt of an arm that rings, `heaviest` [N m] the largest moment at
     rest, and `calm` a step of x that does not make it ring. `rigid` says whether the demand does
     not depend on dry friction, `strained` whether an offset counts by the load, `dynamic` whether
-    velocity or acceleration count, and `swings` whether each dt solves the equation of motion.
+    velocity or acceleration count, `swings` whether each dt solves the equation of motion, and
+    `plays` whether the loop's width depends on the load (see `load_play`).
     """
 
     wires: Wires
@@ -66,14 +68,15 @@ class Arm(NamedTuple):
     strained: bool
     dynamic: bool
     swings: bool
+    plays: bool
 
 
 class State(NamedTuple):
-    """What an arm remembers: memory of each muscle, motion, and room for each muscle's input."""
+    """What an arm remembers: memory and load beyond x of each muscle, and motion."""
 
     memories: np.ndarray
     motion: np.ndarray
-    inputs: np.ndarray
+    loads: np.ndarray
 
 
 @lean
@@ -150,6 +153,12 @@ def keep_motion(arm: Arm, motion: np.ndarray, angle: float, dt: float) -> None:
     motion[BEFORE_DT] = dt
     motion[BEFORE_ANGLE], motion[BEFORE_VELOCITY] = motion[ANGLE], motion[VELOCITY]
     motion[VELOCITY] = velocity
+
+
+@lean
+def width(arm: Arm, line: int, k: int, share: float) -> float:
+    """Return by how much the loop is wider than that of H2 at a place."""
+    return grid.between(arm.grid, WIDTH + LINE * line, k, share) if arm.plays else 0.0
 
 
 @lean

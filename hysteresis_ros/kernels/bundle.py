@@ -5,9 +5,9 @@ Parallel muscles of unequal length, which share the load as their own memories a
 
 A muscle that lacks dL_i is stretched further than the mean one and bears more. What it bears more
 strains its wire further, and stretches it elastically:
-``S(F_i) (H2[u_i] - L0) + c (u_i - u) = S(F) (H - L0) - dL_i``, with S the factor on the strain
-under a load, c the compliance, u and F input and load of the mean muscle, and H what the
-transformation gives under that load.
+``S(F_i) (H2[u_i] - L0) + c (F_i - F) = S(F) (H - L0) - dL_i``, with S the factor on the strain
+under a load, c the compliance, F the load of the mean muscle, and H what the transformation gives
+under that load. u_i follows ``v_i = F_i - x`` with the play that its own load says (`load_play`).
 """
 
 from typing import NamedTuple
@@ -16,6 +16,7 @@ import numpy as np
 
 from . import root
 from .lean import lean
+from .load_play import held
 from .operator import last_input, last_output, peek, step
 
 # About how far muscles go for a load that is missing [m/N], to begin a search with.
@@ -33,8 +34,8 @@ class Wires(NamedTuple):
 
     `table` is that of H2 and `base` [m] its least output; `offsets` (M,) [m] are the excess
     lengths, `compliance` [m/N] that of a wire, and `tolerance` [N] the load that may be missing.
-    `scales` (m,) is the factor on the strain at loads `spacing` [N] apart from `lightest` on, as
-    the transformation feels them.
+    `scales` (m,) is the factor on the strain, and `widths` (m,) by how much the loop is wider than
+    that of H2, at loads `spacing` [N] apart from `lightest` on, as the transformation feels them.
     """
 
     table: np.ndarray
@@ -43,6 +44,7 @@ class Wires(NamedTuple):
     compliance: float
     tolerance: float
     scales: np.ndarray
+    widths: np.ndarray
     lightest: float
     spacing: float
 
@@ -50,30 +52,42 @@ class Wires(NamedTuple):
 @lean
 def scale_at(wires: Wires, load: float) -> float:
     """Return the factor on the strain under a load, as the transformation feels it."""
-    last = len(wires.scales) - 1
-    if last == 0:
-        return wires.scales[0]
-    place = min(max((load - wires.lightest) / wires.spacing, 0.0), float(last))
-    k = min(int(place), last - 1)
-    return wires.scales[k] + (place - k) * (wires.scales[k + 1] - wires.scales[k])
+    return _looked_up(wires, wires.scales, load)
 
 
 @lean
-def inputs_for(wires: Wires, memories: np.ndarray, output: float, load: float, x: float,
-               inputs: np.ndarray) -> None:
+def _looked_up(wires: Wires, values: np.ndarray, load: float) -> float:
+    """Return the value of a table (m,) under a load, as the transformation feels it."""
+    last = len(values) - 1
+    if last == 0:
+        return values[0]
+    place = min(max((load - wires.lightest) / wires.spacing, 0.0), float(last))
+    k = min(int(place), last - 1)
+    return values[k] + (place - k) * (values[k + 1] - values[k])
+
+
+@lean
+def input_for(wires: Wires, memory: np.ndarray, v: float, x: float) -> float:
+    """Return the input of H2 of a muscle with ``v = F - x``."""
+    return held(last_input(wires.table, memory), v, _looked_up(wires, wires.widths, v + x))
+
+
+@lean
+def loads_for(wires: Wires, memories: np.ndarray, output: float, load: float, x: float,
+              loads: np.ndarray) -> None:
     """
-    Put each muscle's input ``u_i = F_i - x`` for an output under a mean load into `inputs`.
+    Put each muscle's ``v_i = F_i - x`` for an output under a mean load into `loads`.
 
     What is there is where the search begins.
     """
     for i in range(len(wires.offsets)):
-        inputs[i] = _input_for(wires, memories[i], wires.offsets[i], output, load, x, inputs[i])
+        loads[i] = _load_for(wires, memories[i], wires.offsets[i], output, load, x, loads[i])
 
 
 @lean
-def _input_for(wires: Wires, memory: np.ndarray, offset: float, output: float, load: float,
-               x: float, start: float) -> float:
-    """Return the input of one muscle, by stepping outward and then by false position."""
+def _load_for(wires: Wires, memory: np.ndarray, offset: float, output: float, load: float,
+              x: float, start: float) -> float:
+    """Return v of one muscle, by stepping outward and then by false position."""
     tolerance = wires.tolerance * wires.compliance
     near = start
     here = _excess(wires, memory, near, offset, output, load, x)
@@ -103,21 +117,21 @@ def _input_for(wires: Wires, memory: np.ndarray, offset: float, output: float, l
 
 
 @lean
-def _excess(wires: Wires, memory: np.ndarray, u: float, offset: float, output: float, load: float,
+def _excess(wires: Wires, memory: np.ndarray, v: float, offset: float, output: float, load: float,
             x: float) -> float:
-    """Return how much longer a muscle with an input is than the others let it be [m]."""
-    mean = scale_at(wires, load)
-    return (scale_at(wires, u + x) * (peek(wires.table, memory, u) - wires.base)
-            + wires.compliance * (u + x - load) + offset) / mean - (output - wires.base)
+    """Return how much longer a muscle with a load v + x is than the others let it be [m]."""
+    mean, given = scale_at(wires, load), peek(wires.table, memory, input_for(wires, memory, v, x))
+    return (scale_at(wires, v + x) * (given - wires.base)
+            + wires.compliance * (v + x - load) + offset) / mean - (output - wires.base)
 
 
 @lean
-def mean_load(inputs: np.ndarray, x: float) -> float:
-    """Return the mean load for each muscle's input; a wire cannot push."""
+def mean_load(loads: np.ndarray, x: float) -> float:
+    """Return the mean load for each muscle's v; a wire cannot push."""
     total = 0.0
-    for i in range(len(inputs)):
-        total += max(inputs[i] + x, 0.0)
-    return total / len(inputs)
+    for i in range(len(loads)):
+        total += max(loads[i] + x, 0.0)
+    return total / len(loads)
 
 
 @lean
@@ -139,10 +153,10 @@ def mean_output(wires: Wires, memories: np.ndarray) -> float:
 
 
 @lean
-def commit(wires: Wires, memories: np.ndarray, inputs: np.ndarray) -> None:
-    """Commit each muscle's input."""
+def commit(wires: Wires, memories: np.ndarray, loads: np.ndarray, x: float) -> None:
+    """Commit each muscle's v."""
     for i in range(len(wires.offsets)):
-        step(wires.table, memories[i], inputs[i])
+        step(wires.table, memories[i], input_for(wires, memories[i], loads[i], x))
 
 
 @lean
@@ -153,17 +167,17 @@ def keep_gain(search: np.ndarray, at: int, moved: float, scale: float, here: flo
 
 @lean
 def drive(wires: Wires, memories: np.ndarray, search: np.ndarray, output: float, load: float,
-          inputs: np.ndarray) -> float:
+          loads: np.ndarray) -> float:
     """Return the x [N] under which the muscles give `output` [m] and bear `load` [N] each."""
     near = load - mean_input(wires, memories)
-    inputs_for(wires, memories, output, load, near, inputs)
-    here = load - mean_load(inputs, near)
+    loads_for(wires, memories, output, load, near, loads)
+    here = load - mean_load(loads, near)
     if abs(here) <= wires.tolerance:
         return near
     x = root.begin(search, 0, near, here, search[GAIN] * here, -np.inf, np.inf, wires.tolerance)
     while root.searching(search, 0):
-        inputs_for(wires, memories, output, load, x, inputs)
-        x = root.proceed(search, 0, load - mean_load(inputs, x))
+        loads_for(wires, memories, output, load, x, loads)
+        x = root.proceed(search, 0, load - mean_load(loads, x))
     keep_gain(search, 0, x - near, 1.0, here)
     return x
 
@@ -176,16 +190,17 @@ def respond(wires: Wires, memories: np.ndarray, search: np.ndarray, x: float, lo
 
     Commits nothing; the output is looked for between `low` and `high`, first at `near`.
     """
-    near = min(max(near, low), high)
-    inputs_for(wires, memories, near, load, x, inputs)
+    output = near = min(max(near, low), high)
+    loads_for(wires, memories, near, load, x, inputs)
     here = load - mean_load(inputs, x)
-    if abs(here) <= wires.tolerance:
-        return near
-    output = root.begin(search, 0, near, here, TYPICAL_COMPLIANCE * search[GAIN] * here, low, high,
-                        wires.tolerance)
-    while root.searching(search, 0):
-        inputs_for(wires, memories, output, load, x, inputs)
-        output = root.proceed(search, 0, load - mean_load(inputs, x))
-    if low < output < high:
-        keep_gain(search, 0, output - near, TYPICAL_COMPLIANCE, here)
+    if abs(here) > wires.tolerance:
+        output = root.begin(search, 0, near, here, TYPICAL_COMPLIANCE * search[GAIN] * here, low,
+                            high, wires.tolerance)
+        while root.searching(search, 0):
+            loads_for(wires, memories, output, load, x, inputs)
+            output = root.proceed(search, 0, load - mean_load(inputs, x))
+        if low < output < high:
+            keep_gain(search, 0, output - near, TYPICAL_COMPLIANCE, here)
+    for i in range(len(inputs)):
+        inputs[i] = input_for(wires, memories[i], inputs[i], x)
     return output

@@ -6,6 +6,9 @@ import numpy as np
 
 from .jit import jit
 
+# Rows that are taken off the rows below in one pass, which is the time that memory takes.
+PANEL = 4
+
 
 @jit
 def pivot(gram: np.ndarray, moment: np.ndarray, free: np.ndarray, passive: np.ndarray,
@@ -92,22 +95,48 @@ def solved(gram: np.ndarray, moment: np.ndarray, index: np.ndarray) -> tuple[np.
         values[i] = moment[index[i]]
         for j in range(i, count):
             factor[i, j] = gram[index[i], index[j]]
-    for i in range(count):
-        if not factor[i, i] > 0.0:
-            return values, False
-        root = np.sqrt(factor[i, i])
-        for k in range(i, count):
-            factor[i, k] /= root
-        values[i] /= root
-        for j in range(i + 1, count):
-            share = factor[i, j]
-            values[j] -= share * values[i]
-            # Slices from 0 on, because numba divides only such loops among vector registers.
-            above, row = factor[i, j:], factor[j, j:]
-            for k in range(len(row)):
-                row[k] -= share * above[k]
+    for begin in range(0, count, PANEL):
+        end = min(begin + PANEL, count)
+        for i in range(begin, end):
+            if not factor[i, i] > 0.0:
+                return values, False
+            root = np.sqrt(factor[i, i])
+            for k in range(i, count):
+                factor[i, k] /= root
+            values[i] /= root
+            for j in range(i + 1, end):
+                _take_off(factor, values, i, j)
+        for j in range(end, count):
+            if end < begin + PANEL:
+                for i in range(begin, end):
+                    _take_off(factor, values, i, j)
+            else:
+                _take_off_panel(factor, values, begin, j)
     for i in range(count - 1, -1, -1):
         for j in range(i + 1, count):
             values[i] -= factor[i, j] * values[j]
         values[i] /= factor[i, i]
     return values, True
+
+
+@jit
+def _take_off(factor: np.ndarray, values: np.ndarray, i: int, j: int) -> None:
+    """Take row i of the upper factor off row j, and off the right side."""
+    share = factor[i, j]
+    values[j] -= share * values[i]
+    # Slices from 0 on, because numba divides only such loops among vector registers.
+    above, row = factor[i, j:], factor[j, j:]
+    for k in range(len(row)):
+        row[k] -= share * above[k]
+
+
+@jit
+def _take_off_panel(factor: np.ndarray, values: np.ndarray, i: int, j: int) -> None:
+    """Take as many rows as a panel has, from row i on, off row j: the same in one pass."""
+    p, q, r, s = factor[i, j], factor[i + 1, j], factor[i + 2, j], factor[i + 3, j]
+    values[j] = (values[j] - p * values[i] - q * values[i + 1] - r * values[i + 2]
+                 - s * values[i + 3])
+    first, second = factor[i, j:], factor[i + 1, j:]
+    third, fourth, row = factor[i + 2, j:], factor[i + 3, j:], factor[j, j:]
+    for k in range(len(row)):
+        row[k] = row[k] - p * first[k] - q * second[k] - r * third[k] - s * fourth[k]

@@ -13,7 +13,7 @@ import numpy as np
 from . import bundle, grid, root
 from .arm import (
     ANGLE, Arm, BUNDLE_SEARCH, DEMAND, demand_at, LINE, LOAD, place, present, required, REST_GAIN,
-    REST_SEARCH, State)
+    REST_SEARCH, State, width)
 from .lean import lean
 from .operator import last_input, last_output, peek, solve, step
 
@@ -24,25 +24,33 @@ def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: f
     """Commit the u next to the present one at which one muscle balances, and return the place."""
     table, memory, motion = arm.wires.table, state.memories[0], state.motion
     start = u = last_input(table, memory)
-    here = _lacking(arm, state, line, u, x, offset, factor)
+    here, play = _lacking(arm, state, line, u, x, offset, factor, 0.0), 0.0
+    if arm.plays and here > 0.0:
+        # On the way to the cold the play is taken up first.
+        here, play = max(_lacking(arm, state, line, u, x, offset, factor, 1.0), 0.0), 1.0
     if abs(here) > arm.tolerance:
         u = root.begin(motion, REST_SEARCH, u, here, here * motion[REST_GAIN], -np.inf, np.inf,
                        arm.tolerance)
         while root.searching(motion, REST_SEARCH):
             u = root.proceed(
-                motion, REST_SEARCH, _lacking(arm, state, line, u, x, offset, factor))
+                motion, REST_SEARCH, _lacking(arm, state, line, u, x, offset, factor, play))
         motion[REST_GAIN] = min(max((u - start) / here, 0.5), 10.0)
         step(table, memory, u)
     return place(arm, motion, line, factor * (last_output(table, memory) - arm.base), offset)
 
 
 @lean
-def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: float, factor: float
-             ) -> float:
-    """Return the load that the arm asks for beyond the one under which H2 has the input u."""
+def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: float, factor: float,
+             play: float) -> float:
+    """
+    Return the load that the arm asks for beyond the one under which H2 has the input u.
+
+    `play` is the share of the play that is taken up: 0 where the muscle heats, 1 where it cools.
+    """
     output = peek(arm.wires.table, state.memories[0], u)
     k, share = place(arm, state.motion, line, factor * (output - arm.base), offset)
-    return grid.between(arm.grid, LOAD + LINE * line, k, share) - x - u
+    load = grid.between(arm.grid, LOAD + LINE * line, k, share)
+    return load - play * width(arm, line, k, share) - x - u
 
 
 @lean
@@ -70,7 +78,7 @@ def settle_bundle(arm: Arm, state: State, line: int, x: float, offset: float, fa
             point = root.proceed(motion, BUNDLE_SEARCH, missing)
         if 0.0 < point < last:
             bundle.keep_gain(motion, BUNDLE_SEARCH, point - near, scale, here)
-    bundle.commit(arm.wires, state.memories, state.inputs)
+    bundle.commit(arm.wires, state.memories, state.loads, x)
     return k, share
 
 
@@ -82,8 +90,8 @@ def _lacking_bundle(arm: Arm, state: State, line: int, point: float, x: float, o
     share = point - (k - 1)
     output = arm.base + demand_at(arm, line, k, share, offset) / factor
     load = required(arm, state.motion, line, k, share, dt)
-    bundle.inputs_for(arm.wires, state.memories, output, load, x, state.inputs)
-    return k, share, load - bundle.mean_load(state.inputs, x)
+    bundle.loads_for(arm.wires, state.memories, output, load, x, state.loads)
+    return k, share, load - bundle.mean_load(state.loads, x)
 
 
 @lean
@@ -93,7 +101,7 @@ def direction(arm: Arm, state: State, x: float, offset: float, factor: float, dt
     k, share = present(arm, motion)
     if arm.rigid:
         tension = max(last_input(arm.wires.table, state.memories[0]) + x, 0.0)
-        if required(arm, motion, 1, k, share, dt) > tension:
+        if required(arm, motion, 1, k, share, dt) - width(arm, 1, k, share) > tension:
             return 1
         return -1 if required(arm, motion, 2, k, share, dt) < tension else 0
     sinking = _lacking_held(arm, state, k, share, 1.0, x, offset, factor, dt)
@@ -107,7 +115,7 @@ def direction(arm: Arm, state: State, x: float, offset: float, factor: float, dt
         drag = root.proceed(motion, REST_SEARCH, _lacking_held(
             arm, state, k, share, drag, x, offset, factor, dt))
     # The arm stands still, but its load has changed, and with it what the load does.
-    bundle.commit(arm.wires, state.memories, state.inputs)
+    bundle.commit(arm.wires, state.memories, state.loads, x)
     return 0
 
 
@@ -121,8 +129,8 @@ def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: 
     load = required(arm, state.motion, 0, k, share, dt)
     load += part * (required(arm, state.motion, edge, k, share, dt) - load)
     output = arm.base + demand / factor
-    if len(arm.wires.offsets) > 1:
-        bundle.inputs_for(arm.wires, state.memories, output, load, x, state.inputs)
+    if arm.plays or len(arm.wires.offsets) > 1:
+        bundle.loads_for(arm.wires, state.memories, output, load, x, state.loads)
     else:
-        state.inputs[0] = solve(arm.wires.table, state.memories[0], output)[0]
-    return load - bundle.mean_load(state.inputs, x)
+        state.loads[0] = solve(arm.wires.table, state.memories[0], output)[0]
+    return load - bundle.mean_load(state.loads, x)

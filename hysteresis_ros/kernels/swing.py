@@ -13,10 +13,11 @@ import math
 
 from . import grid, root
 from .arm import (
-    Arm, INSIDE, LENGTH, LEVERAGE, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD, REST_SEARCH, SCALE, State,
-    STRETCH, SWING_GAIN, THETA)
+    Arm, INSIDE, LENGTH, LEVERAGE, LOOP, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD, REST_SEARCH, SCALE,
+    State, STRETCH, SWING_GAIN, THETA)
 from .bundle import TYPICAL_COMPLIANCE
 from .lean import lean
+from .load_play import held
 from .operator import last_input, peek, step
 
 # Least share of a load that is missing by which the load changes in a dt.
@@ -64,7 +65,7 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
     if u + x < arm.loads[0, INSIDE]:
         u = arm.loads[0, INSIDE] - x
         k, share = _fly(arm, drag, slope)
-    step(table, memory, u)
+    step(table, memory, _input(arm, state, u, x))
     return k, share
 
 
@@ -104,7 +105,7 @@ def _lacking(arm: Arm, state: State, u: float, x: float, offset: float, factor: 
 @lean
 def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: float
             ) -> tuple[float, float]:
-    """Return the load of the muscle and its elongation."""
+    """Return the load of the muscle that is u beyond x, as it feels it, and its elongation."""
     n = grid.interval(arm.loads, INSIDE, u + x, int(state.motion[NEAR_LOAD]))
     state.motion[NEAR_LOAD] = n
     part = (u + x - arm.loads[n - 1, INSIDE]) / (
@@ -113,9 +114,21 @@ def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: f
     # A loose muscle's load goes on falling, so that the root can be found.
     part = max(part, 0.0)
     scale = grid.between(arm.loads, SCALE, n, part)
-    output = peek(arm.wires.table, state.memories[0], u)
+    output = peek(arm.wires.table, state.memories[0], _input(arm, state, u, x))
     return load, (arm.base + scale * factor * (output - arm.base)
                   + grid.between(arm.loads, STRETCH, n, part) + offset)
+
+
+@lean
+def _input(arm: Arm, state: State, u: float, x: float) -> float:
+    """Return the input of H2 for a load that is u beyond x, as the transformation feels it."""
+    if not arm.plays:
+        return u
+    n = grid.interval(arm.loads, INSIDE, u + x, int(state.motion[NEAR_LOAD]))
+    part = (u + x - arm.loads[n - 1, INSIDE]) / (
+        arm.loads[n, INSIDE] - arm.loads[n - 1, INSIDE])
+    loop = max(grid.between(arm.loads, LOOP, n, part), 0.0)
+    return held(last_input(arm.wires.table, state.memories[0]), u, loop)
 
 
 @lean

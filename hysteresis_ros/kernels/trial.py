@@ -37,7 +37,7 @@ def start(arm: Arm, state: State) -> None:
     """Wipe the memory: after a full heat and cool cycle, before the first sample."""
     for i in range(len(arm.wires.offsets)):
         reset(arm.wires.table, state.memories[i])
-        state.inputs[i] = last_input(arm.wires.table, state.memories[i])
+        state.loads[i] = last_input(arm.wires.table, state.memories[i])
     motion = state.motion
     motion[:] = 0.0
     motion[ANGLE] = motion[BEFORE_DT] = np.nan

@@ -168,6 +168,17 @@ class Chain:
         """Return the load as the transformation feels it."""
         return load + sum(effect.shift_load(load, self.surroundings) for effect in self.material)
 
+    @property
+    def plays(self) -> bool:
+        """Whether the loop's width depends on the load."""
+        return any(type(effect).loop_width is not MaterialEffect.loop_width
+                   for effect in self.material)
+
+    def loop_width(self, load: Values) -> Values:
+        """Return w(F), by which the loop is wider than that of H2, at least 0."""
+        return np.maximum(sum((effect.loop_width(load, self.surroundings)
+                               for effect in self.material), 0.0 * load), 0.0)
+
     def scale(self, load: Values) -> Values:
         """Return S(F), the factor on the transformation strain."""
         factor = 1.0

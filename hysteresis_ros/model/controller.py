@@ -133,7 +133,7 @@ class Controller:
         self._force = copy.deepcopy(model.force_stage)
         if model.length_stage is not None:
             self._second = SecondStage(model.require_length_stage(), model.sign,
-                                       self._chain)
+                                       self._chain, self._first.loaded)
         self._pacing = Pacing(
             [self._chain, *_with_other_lags(model, self._chain, lag_margin)], self._clip,
             self._inputs, horizon, rate_limit, latent * model.surroundings.full_drive_squared)
@@ -365,19 +365,18 @@ class Controller:
     def _setpoint(self, length: float, force: float, time: float | None, ambient: float
                   ) -> Setpoint:
         self._pacing.advance(time)
-        load = float(self._chain.load_inside(np.float64(force))) if self._first.loaded else 0.0
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
-            self._second.settle_cold(self._cold, load, self._at_rest()[1] if self._arm else None)
+            self._second.settle_cold(self._cold, force, self._at_rest()[1] if self._arm else None)
             self._pacing.rest(float(self.model.martensite(self._second.output)))
         inputs = self._inputs(0.0, self._share(length, force), ambient)
         find = self._search if self._steady.drifts else self._invert
-        drive, saturated = find(length, force, load, inputs)
-        outcome = self._outcome(drive, force, load, inputs)
+        drive, saturated = find(length, force, inputs)
+        outcome = self._outcome(drive, force, inputs)
         if saturated and self._chain.needs_phase:
             for _ in range(PHASE_PASSES):
                 inputs = inputs._replace(phase=self._share(outcome.length, force))
-                outcome = self._outcome(drive, force, load, inputs)
+                outcome = self._outcome(drive, force, inputs)
         # At the ends of the drive a plateau, or rounding, may give just what was asked for.
         saturated = saturated and not (
             abs(outcome.length - length) <= REACHED * self._chain.surroundings.span)
@@ -399,17 +398,15 @@ class Controller:
         """Return the share of martensite at a length [m] under a force [N]."""
         return float(self.model.martensite(self._transformed(length, force)))
 
-    def _invert(self, length: float, force: float, load: float, inputs: Inputs
-                ) -> tuple[float, bool]:
+    def _invert(self, length: float, force: float, inputs: Inputs) -> tuple[float, bool]:
         """Drive in closed form, and whether it is out of reach."""
         x, out_of_reach = self._second.drive(
-            self._transformed(length, force), load, self.dead_band)
+            self._transformed(length, force), force, self.dead_band)
         drive_squared, saturated = self._first.invert(x)
         drive, clipped = self._clip(self._steady.inverse(drive_squared, inputs))
         return drive, out_of_reach or saturated or clipped
 
-    def _search(self, length: float, force: float, load: float, inputs: Inputs
-                ) -> tuple[float, bool]:
+    def _search(self, length: float, force: float, inputs: Inputs) -> tuple[float, bool]:
         """Drive by a search: the offset of time and use depends on the drive that is sought."""
         low, high = self.limits
         if not math.isfinite(high):
@@ -417,7 +414,7 @@ class Controller:
 
         def error(drive: float) -> float:
             return self.model.sign * (
-                self._outcome(drive, force, load, inputs).length - length)
+                self._outcome(drive, force, inputs).length - length)
 
         here = self._pacing.drive
         if low <= here <= high and abs(error(here)) <= self.dead_band:
@@ -431,10 +428,10 @@ class Controller:
         from scipy.optimize import brentq   # half a second that most models do not need
         return brentq(error, low, high, xtol=1e-14, rtol=1e-14), False
 
-    def _outcome(self, drive: float, force: float, load: float, inputs: Inputs) -> Outcome:
+    def _outcome(self, drive: float, force: float, inputs: Inputs) -> Outcome:
         """Say what a drive would do; commits nothing."""
         drive_squared = self._steady.step(drive, inputs)
-        output, committed = self._second.respond(self._first.peek(drive_squared), load)
+        output, committed = self._second.respond(self._first.peek(drive_squared), force)
         offset, factor = 0.0, 1.0
         if self._steady.drifts:
             before = self._steady.save()

@@ -6,7 +6,10 @@ from collections.abc import Mapping, Sequence
 import copy
 from typing import Any
 
+import numpy as np
+
 from hysteresis_ros.bicep.bundle import Bundle
+from hysteresis_ros.kernels.load_play import held
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.operators import HysteresisOperator
 
@@ -18,6 +21,8 @@ class SecondStage:
     """
     H2 with its memory: ``output = H2[sign (x - load)]``, and the inverse for x (Eq. 13).
 
+    Where the load widens the loop, the input of H2 is that of `kernels.load_play`.
+
     Parameters
     ----------
     operator : HysteresisOperator
@@ -26,10 +31,13 @@ class SecondStage:
         -1 for muscles that contract when driven, 1 for one that extends.
     chain : Chain
         Effects of the model: excess lengths of the muscles, and how a wire strains under its load.
+    loaded : bool
+        Whether the load is weighed against x; loads do not count else.
     """
 
-    def __init__(self, operator: HysteresisOperator, sign: int, chain: Chain) -> None:
-        self._bundle = Bundle(operator, chain) if len(chain.offsets) > 1 else None
+    def __init__(self, operator: HysteresisOperator, sign: int, chain: Chain, loaded: bool) -> None:
+        self._chain, self._loaded = chain, loaded
+        self._bundle = Bundle(operator, chain, loaded) if len(chain.offsets) > 1 else None
         self._operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self._sign = sign
         self.base, self._top = operator.output_range
@@ -78,18 +86,31 @@ class SecondStage:
 
     def drive(self, output: float, load: float, dead_band: float = 0.0) -> tuple[float, bool]:
         """Return x for an output [m] under a load, and whether that output is out of reach."""
+        inside, width = self._felt(load)
         if self._bundle is not None:
-            return self._bundle.drive(output, load), False
-        found = self._operators[0].invert(output, dead_band=dead_band)
-        return self._sign * found.input + load, found.saturated
+            return self._bundle.drive(output, inside), False
+        operator = self._operators[0]
+        found = operator.invert(output, dead_band=dead_band)
+        play = width if found.input > operator.input else 0.0
+        return self._sign * found.input + inside - play, found.saturated
 
     def respond(self, x: float, load: float) -> tuple[float, list[float]]:
         """Return the output [m] and the inputs that `step` would commit."""
-        if self._bundle is None:
-            u = self._sign * (x - load)
-            return self._operators[0].peek(u), [u]
-        return self._bundle.respond(
-            x, load, self.base - self._room, self._top + self._room, self.base)
+        inside, width = self._felt(load)
+        if self._bundle is not None:
+            return self._bundle.respond(
+                x, inside, self.base - self._room, self._top + self._room, self.base)
+        u = self._sign * (x - inside)
+        if width > 0.0:
+            u = held(self._operators[0].input, u, width)
+        return self._operators[0].peek(u), [u]
+
+    def _felt(self, load: float) -> tuple[float, float]:
+        """Return a load as the transformation feels it, and by how much it widens the loop."""
+        if not self._loaded:
+            return 0.0, 0.0
+        felt = np.float64(load)
+        return float(self._chain.load_inside(felt)), float(self._chain.loop_width(felt))
 
     def step(self, inputs: Sequence[float]) -> None:
         """Commit each muscle's input."""

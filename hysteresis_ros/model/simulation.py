@@ -15,6 +15,7 @@ import numpy as np
 from hysteresis_ros.bicep.balance import ArmBalance, statics_of
 from hysteresis_ros.effects import Effect, Inputs
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.stepper import Stepper
@@ -322,9 +323,13 @@ class Simulator:
         model = self.model
         cold, x, drive_squared = self._first(chain, first, trial, inputs)
         load = chain.load_inside(trial.load) if first.loaded else 0.0 * trial.load
+        given = model.sign * (np.concatenate(([cold], x)) - np.concatenate((load[:1], load)))
+        if chain.plays and first.loaded:
+            width = chain.loop_width(trial.load)
+            given = follow(given, np.concatenate((width[:1], width)), np.array([len(given)]))
         stage.reset()
-        stage.step(model.sign * (cold - load[0]))
-        output = stage.simulate(model.sign * (x - load))
+        stage.step(given[0])
+        output = stage.simulate(given[1:])
         base = stage.output_range[0]
         offset, factor = chain.drift(trial.drive, drive_squared, inputs)
         return Response(base + chain.scale(trial.load) * factor * (output - base)
