@@ -14,7 +14,7 @@ from hysteresis_ros.cli.outputs import InputPath, OutputFile, OutputFileOrStdout
 PATHS = (InputPath, OutputFile, OutputFileOrStdout, OutputFolder)
 # Text that names no file, with a value that the parser takes.
 WORDS = {'namespace': 'left', 'add': 'payload_error', 'effects': 'none', 'protocol': 'bench',
-         'name': 'creep', 'hidden': 'creep', 'muscle': 'grains'}
+         'name': 'creep', 'hidden': 'creep', 'muscle': 'grains', 'port': 'avr://'}
 
 
 def options(command):

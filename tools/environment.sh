@@ -37,10 +37,13 @@ if [ "$(cat "$folder/identity" 2>/dev/null)" != "$identity" ]; then
     printf '%s\n' "$identity" > "$folder/identity"
 fi
 
+# What is never imported need not be compiled to bytecode, which takes as long as all the rest.
 install() {
-    "$folder/bin/python" -m pip install -qq --disable-pip-version-check \
+    "$folder/bin/python" -m pip install -qq --disable-pip-version-check --no-compile \
         ${constraints:+--constraint "$constraints"} "$@"
 }
+# Resolving takes the pip that comes with Python 3.11 and 3.12 minutes.
+install --upgrade pip || echo "$folder keeps the pip that it came with" >&2
 # colcon still calls `setup.py install`, which setuptools 80 gave up; colcon-core bounds it, too.
 install 'setuptools<80'
 colcon='colcon-core colcon-ros colcon-output colcon-package-information colcon-package-selection
