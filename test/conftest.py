@@ -20,6 +20,12 @@ SLOW = ('test_bench_diagnosis', 'test_demo', 'test_diagnose', 'test_faults',
         'test_loads', 'test_page_in_browser', 'test_readme', 'test_studio_in_browser',
         'test_table1')
 
+# Nodes and boards at work. They depend on ROS, which is the same with all versions of the rest, and
+# wait for each other, so that continuous integration runs them with one set of versions.
+NODES = ('test_board', 'test_board_clocks', 'test_board_heat_and_cool', 'test_bridge_node',
+         'test_commands', 'test_compensator_node', 'test_geometry_node', 'test_lifecycle',
+         'test_node_parameters', 'test_node_running', 'test_protection')
+
 # Tests of other runs on the same network must not be heard; rclpy reads this at its start.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
@@ -33,10 +39,11 @@ hypothesis.settings.load_profile('suite')
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what `-m "not slow"` leaves out."""
+    """Mark what `-m "not slow"` and `-m "not nodes"` leave out."""
     for item in items:
-        if item.path.stem in SLOW:
-            item.add_marker('slow')
+        for marker, stems in (('slow', SLOW), ('nodes', NODES)):
+            if item.path.stem in stems:
+                item.add_marker(marker)
 
 
 @pytest.fixture(scope='session')
