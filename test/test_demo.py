@@ -57,6 +57,7 @@ def test_the_demo_drives_the_arm_and_reads_its_bag_back(root, tmp_path, domain_i
     assert any(path.suffix == '.png' for path in folder.iterdir())
 
 
+@pytest.mark.long
 def test_a_hidden_lag_is_found_and_made_up_for(root, tmp_path, domain_id):
     """Driven again with the extended model the arm is where it should be in time."""
     pytest.importorskip('rclpy', reason='the nodes need ROS 2')
