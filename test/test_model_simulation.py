@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy import optimize
 
+from hysteresis_ros.bicep.balance import ArmBalance
+from hysteresis_ros.effects import SensorEffect
 from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import LinearModel, simulation, Simulator
@@ -89,6 +91,57 @@ def test_an_arm_run_without_a_first_stage_ignores_the_load():
     stage.step(0.0)
     lengths = [stage.step(-v) for v in voltage]
     np.testing.assert_allclose(GEOMETRY.length(model.predict(arm_run(voltage))), lengths, atol=2e-8)
+
+
+@pytest.mark.parametrize('names', [
+    (), *((name,) for name in STRENGTHS), ('thermal_lag', 'coulomb_friction', 'backlash'),
+    ('unequal_muscles', 'coulomb_friction'), ('fatigue', 'latency')])
+def test_judged_rows_are_the_same_where_the_others_are_interpolated(names):
+    model = bicep_model()
+    # Ramps with holds and reversals between them, such as a recording in motion has.
+    voltage = np.repeat(VOLTAGE[::20], [1, 30] * 20)
+    voltage[200:600] = VOLTAGE[200:600]
+    run = arm_run(voltage, 0.1, cycles=np.zeros(len(voltage)))
+    judged = np.arange(0, len(voltage), 23)
+    effects = [effect_of(model, name) for name in names]
+    found, whole = (Simulator(model, run, rows).run(effects)[judged] for rows in (judged, None))
+    # What depends on the phase needs all rows, and is only brought into agreement so far.
+    away = 2e-3 if any(effect.needs_phase for effect in effects) else 1e-6
+    np.testing.assert_allclose(found, whole, rtol=0.0, atol=away)
+
+
+def test_an_arm_at_rest_is_balanced_where_it_is_judged_and_where_an_input_turns(monkeypatch):
+    model, balanced = bicep_model(), []
+    run_trial = ArmBalance.run
+
+    def count(balance, cold, x, *columns):
+        balanced.append(len(x))
+        return run_trial(balance, cold, x, *columns)
+
+    monkeypatch.setattr(ArmBalance, 'run', count)
+    run = arm_run(np.concatenate([np.linspace(0.0, 6.0, 300), np.full(100, 6.0),
+                                  np.linspace(6.0, 1.0, 300)]), 0.1)
+    judged = np.array([150, 350, 500])
+    for names in ((), ('viscous_friction',)):
+        Simulator(model, run, judged).run([effect_of(model, name) for name in names])
+    # Three judged, the first and the last, begin and end of the hold; all where velocity counts.
+    assert balanced[0] <= 8 and balanced[1] == 700
+    Simulator(model, run, judged).run([], exact=True)
+    assert balanced[2] == 700
+
+
+def test_a_sensor_effect_that_does_not_say_what_it_reads_gets_all_rows():
+    class Smoothed(SensorEffect):
+        id = 'smoothed'
+
+        def forward(self, response, inputs):
+            return np.convolve(response, np.full(9, 1.0 / 9.0), 'same')
+
+    model = bicep_model()
+    judged = np.arange(0, len(VOLTAGE), 23)
+    found, whole = (Simulator(model, arm_run(VOLTAGE, 0.1), rows).run([Smoothed()])[judged]
+                    for rows in (judged, None))
+    np.testing.assert_array_equal(found, whole)
 
 
 @pytest.mark.parametrize('jobs', [1, 2])

@@ -67,6 +67,8 @@ class ArmBalance:
         leverage = geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6)
         self.base = operator.output_range[0]
         self.has_dynamics = chain.moves
+        # Range of H2's input, in the unit of the load.
+        self.span = operator.upper - operator.lower
         compliance = chain.compliance()
         several = len(chain.offsets) > 1
         wires, self.operators, memories = wires_of(operator, chain, loaded)
@@ -83,10 +85,10 @@ class ArmBalance:
                                   *(column for line in lines for column in line)]),
             loads=loads, spacing=spacing, base=self.base, coulomb=self.coulomb,
             viscous=self.viscous, inertia=self.inertia,
-            tolerance=1e-10 * (operator.upper - operator.lower),
+            tolerance=1e-10 * self.span,
             longest=LONGEST_PHASE * math.sqrt(self.inertia / stiffness),
             heaviest=max(float(np.max(np.abs(statics.moment))), 1e-12),
-            calm=CALM_STEP * (operator.upper - operator.lower),
+            calm=CALM_STEP * self.span,
             # The wires of unequal muscles stretch when the drive changes, even if the arm sticks.
             rigid=not several and all(np.array_equal(line[0], lines[0][0]) for line in lines),
             strained=any(np.any(line[3] != 1.0) for line in lines), dynamic=self.has_dynamics,

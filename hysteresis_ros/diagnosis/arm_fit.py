@@ -200,6 +200,8 @@ class Fitter:
         self.covariance = covariance
         self.discrepancy = discrepancy
         self.fixed = list(problem.model.effects)
+        # The covariances of the fit judged last, since it is often judged again after a step.
+        self._judged: tuple[Covariance, list[Point]] = (covariance, [])
 
     def simulate(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
         """Return the responses (len(sets), n) with sets of effects added to the model's own."""
@@ -300,10 +302,8 @@ class Fitter:
         if fit.covariance is None:
             best, points = dataclasses.replace(fit, log_evidence=-np.inf), self.covariance.points
         else:
-            count = len(self.covariance.points)
-            best = dataclasses.replace(fit, judged=count)
-            points = fit.covariance.points_at(
-                point.values for point in self.covariance.points[fit.judged:])
+            best = dataclasses.replace(fit, judged=len(self.covariance.points))
+            points = self._points_of(fit.covariance, fit.judged)
         for point in points:
             residual = point.whiten(self.problem.measured - fit.predicted)
             jacobian = point.whiten(fit.jacobian) if len(fit.vector) else fit.jacobian
@@ -314,6 +314,17 @@ class Fitter:
                 best = dataclasses.replace(
                     best, log_evidence=evidence, values=point.values, spread=np.linalg.inv(matrix))
         return best
+
+    def _points_of(self, covariance: Covariance, first: int) -> Iterable[Point]:
+        """Return the covariances at hand from the first on, with a fit's own discrepancy."""
+        values = [point.values for point in self.covariance.points]
+        if first > 0:
+            return covariance.points_at(values[first:])
+        if self._judged[0] is not covariance:
+            self._judged = covariance, []
+        known = self._judged[1]
+        known += covariance.points_at(values[len(known):])
+        return known
 
     def point(self, fit: Fit) -> Point:
         """Return the covariance of the residuals under which a fit's evidence is largest."""

@@ -171,22 +171,21 @@ def path_difference(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarra
     theta = np.linspace(*model.require_geometry().angle_range, ANGLES)
     load, demand = _statics(chain, model.require_geometry(), theta, stage.output_range[0])
     columns = []
-    for simulator in problem.simulators:
+    for simulator, rows in zip(problem.simulators, problem.chosen):
         angle = simulator.run(effects)
         ends = np.interp([np.min(angle), np.max(angle)], theta, load)
         loads = np.linspace(np.min(ends), np.max(ends) + 1e-9 * (1.0 + np.ptp(load)), LOADS)
-        column = np.empty(len(angle))
         for trial in simulator.trials:
+            judged = rows[(rows >= trial.rows.start) & (rows < trial.rows.stop)] - trial.rows.start
             drive_squared = chain.drive_squared(trial.drive, trial.inputs)
             first.reset()
             cold = chain.to_drive_squared(model.cold_drive)
             x = first.simulate(np.concatenate(([cold], drive_squared)))
             outputs = np.stack([_held(stage, model.sign * (x - one)) for one in loads])
-            moving, still = (_balance(theta, load, demand, loads, given) for given in (
+            moving, still = (_balance(theta, load, demand, loads, given[:, judged]) for given in (
                 _along(stage, model.sign, x, angle[trial.rows], theta, load), outputs))
-            column[trial.rows] = still - moving
-        columns.append(column)
-    return problem.pick(columns)
+            columns.append(still - moving)
+    return np.concatenate(columns)
 
 
 def _statics(chain: Chain, geometry: BicepGeometry, theta: np.ndarray, base: float

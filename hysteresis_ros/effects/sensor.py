@@ -38,6 +38,10 @@ class EncoderOffset(SensorEffect):
         """Take the offset away."""
         return response - math.radians(self.offset)
 
+    def rows_read(self, asked: np.ndarray, inputs: Inputs) -> np.ndarray:
+        """Each row reads its own."""
+        return asked
+
 
 class Backlash(SensorEffect):
     """Play between shaft and encoder."""
@@ -91,6 +95,10 @@ class Backlash(SensorEffect):
         # Not a turn yet: the furthest target goes on to count.
         return self._target + self._lead
 
+    def rows_read(self, asked: np.ndarray, inputs: Inputs) -> np.ndarray:
+        """Each row reads its own, and remembers turns alone."""
+        return asked
+
 
 class Latency(SensorEffect):
     """The measurement arrives late."""
@@ -120,6 +128,13 @@ class Latency(SensorEffect):
             time = np.append(time[0] - inputs.dt[0], time)
             response = np.append(self._past[-1][1], response)
         return np.interp(inputs.time - self.delay, time, response)
+
+    def rows_read(self, asked: np.ndarray, inputs: Inputs) -> np.ndarray:
+        """Each row reads those before and after the moment of a delay ago."""
+        read = np.zeros_like(asked)
+        after = np.searchsorted(inputs.time, inputs.time[asked] - self.delay)
+        read[np.maximum(after - 1, 0)] = read[after] = True
+        return read
 
     def start(self) -> None:
         """Forget the past."""

@@ -214,6 +214,25 @@ class SensorEffect(Effect):
         inputs = Inputs(*(np.array([entry]) for entry in (0., 0., dt, math.nan, math.nan, 0.)))
         return float(self.forward(np.array([value]), inputs)[0])
 
+    def rows_read(self, asked: np.ndarray, inputs: Inputs) -> np.ndarray:
+        """
+        Return the rows whose true response is read for the measured one of some rows.
+
+        Where an input turns, starts or stops, the response is known in any case.
+
+        Parameters
+        ----------
+        asked : ndarray of bool, shape (rows,)
+            Rows of one trial whose measured response is wanted.
+        inputs : Inputs
+
+        Returns
+        -------
+        ndarray of bool, shape (rows,)
+            All, if the effect does not say otherwise.
+        """
+        return np.ones_like(asked)
+
     def inverse(self, response: float) -> float:
         """Return the true response that is measured as `response`."""
         return response

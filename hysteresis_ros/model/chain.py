@@ -216,6 +216,12 @@ class Chain:
             offset, factor = offset + added, factor * times
         return offset, factor
 
+    def rows_read(self, asked: np.ndarray, inputs: Inputs) -> np.ndarray:
+        """Return the rows (rows,) whose true response the sensor reads for those asked for."""
+        for effect in reversed(self.sensor):
+            asked = effect.rows_read(asked, inputs)
+        return asked
+
     def measured(self, response: np.ndarray, inputs: Inputs, rest: float | None) -> np.ndarray:
         """Return what the sensor says of the true response of one trial (rows,) after a rest."""
         for effect in self.sensor:

@@ -16,6 +16,7 @@ from hysteresis_ros.bicep.balance import ArmBalance, statics_of
 from hysteresis_ros.effects import Effect, Inputs
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.kernels.load_play import follow
+from hysteresis_ros.kernels.thinned import balanced_rows, between
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.stepper import Stepper
@@ -33,6 +34,9 @@ HOLD = 30.0
 AGREEMENT, PASSES, MOVING_PASSES, LOOK_BACK = 1e-6, 16, 8, 6
 # Fits compare thousands of sets of effects, and are content with less.
 FIT_AGREEMENT, FIT_PASSES, MOVING_FIT_PASSES = 2e-3, 10, 4
+# Where all rows count in a fit, an arm at rest is balanced after each change of x by this share of
+# H2's range, and in between is interpolated.
+SPACING = 0.01
 # Balances that are kept, each with a table of some thousand numbers.
 MOST_BALANCES = 64
 
@@ -121,12 +125,20 @@ class Simulator:
         Operators, geometry and scales; its effects are not looked at.
     measurement : Measurement
         Whose inputs are simulated.
+    judged : ndarray of int, shape (m,), optional
+        Rows of the measurement that are looked at; the others may be interpolated where that does
+        not change these. All by default.
     """
 
-    def __init__(self, model: MuscleModel, measurement: Measurement) -> None:
+    def __init__(self, model: MuscleModel, measurement: Measurement,
+                 judged: np.ndarray | None = None) -> None:
         self.model = model
         self.measurement = measurement
         self.trials = trials_of(model, measurement)
+        self._asked: np.ndarray | None = None
+        if judged is not None and len(judged) < measurement.rows:
+            self._asked = np.zeros(measurement.rows, dtype=bool)
+            self._asked[judged] = True
         self._surroundings = model.surroundings
         self._balances: dict[tuple, ArmBalance] = {}
         # The martensite share of every row in the latest run of a set of effects, by their names,
@@ -173,7 +185,7 @@ class Simulator:
              exact: bool = False) -> tuple[np.ndarray, np.ndarray | None]:
         """Return the response, and the martensite share where effects need it, each (rows,)."""
         chain = Chain(effects, self._surroundings)
-        respond = self._responder(chain)
+        respond = self._responder(chain, exact)
         result = np.empty(self.measurement.rows)
         phase = None
         if chain.needs_phase:
@@ -272,7 +284,7 @@ class Simulator:
             return np.clip((high - given) / max(high - low, 1e-12), 0.0, 1.0)
         return self.model.martensite(given)
 
-    def _responder(self, chain: Chain) -> Callable[[Trial, Inputs], Response]:
+    def _responder(self, chain: Chain, exact: bool = False) -> Callable[[Trial, Inputs], Response]:
         """Return what gives the response of a trial."""
         response = self.measurement.response
         if response == 'force':
@@ -284,7 +296,8 @@ class Simulator:
         first = self.model.first_stage(chain)
         if response == 'angle':
             balance = self._balance(chain)
-            return lambda trial, inputs: self._angle(chain, first, balance, trial, inputs)
+            asked = None if exact or chain.moves else self._asked
+            return lambda trial, inputs: self._angle(chain, first, balance, asked, trial, inputs)
         stage = self.model.require_length_stage()
         return lambda trial, inputs: self._length(chain, first, stage, trial, inputs)
 
@@ -335,11 +348,20 @@ class Simulator:
         return Response(base + chain.scale(trial.load) * factor * (output - base)
                         + chain.stretch(trial.load) + offset, output)
 
-    def _angle(self, chain: Chain, first: FirstStage, balance: ArmBalance, trial: Trial,
-               inputs: Inputs) -> Response:
+    def _angle(self, chain: Chain, first: FirstStage, balance: ArmBalance,
+               asked: np.ndarray | None, trial: Trial, inputs: Inputs) -> Response:
         cold, x, drive_squared = self._first(chain, first, trial, inputs)
-        offset, factor = chain.drift(trial.drive, drive_squared, inputs)
-        rest, angles, outputs, stage_inputs = balance.run(cold, x, inputs.dt, offset, factor)
+        offset, factor = (np.broadcast_to(np.asarray(column, dtype=float), x.shape)
+                          for column in chain.drift(trial.drive, drive_squared, inputs))
+        if asked is None:
+            rest, angles, outputs, stage_inputs = balance.run(cold, x, inputs.dt, offset, factor)
+            return Response(angles, outputs, stage_inputs, rest)
+        # The phase is looked at in all rows.
+        spacing = SPACING * balance.span if chain.needs_phase else np.inf
+        kept = balanced_rows(np.array([x, offset, factor]),
+                             chain.rows_read(asked[trial.rows], inputs), spacing)
+        rest, *columns = balance.run(cold, x[kept], inputs.dt[kept], offset[kept], factor[kept])
+        angles, outputs, stage_inputs = (between(kept, x, column) for column in columns)
         return Response(angles, outputs, stage_inputs, rest)
 
 
