@@ -29,6 +29,9 @@ NODES = ('test_board', 'test_board_clocks', 'test_board_heat_and_cool', 'test_br
 # Tests of other runs on the same network must not be heard; rclpy reads this at its start.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
+# Tests kill nodes, and what these shared in memory would stay for whoever has the domain next.
+os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+
 # Suites run side by side; threads of BLAS that wait for each other would take most of their time.
 # Commands that the tests start see to that themselves.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')

@@ -104,10 +104,11 @@ class Graph:
         return self
 
     def __exit__(self, *error):
-        for node in self.executor.get_nodes():
-            self.executor.remove_node(node)
-            node.destroy_node()
+        nodes = self.executor.get_nodes()
+        # It may hold what it waited for last, which is to go first.
         self.executor.shutdown()
+        for node in nodes:
+            node.destroy_node()
         rclpy.shutdown(context=self.context)
 
 
