@@ -18,6 +18,7 @@ from hysteresis_ros.model.simulation import trials_of
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY, STRENGTHS, wandering_voltage
 
 VOLTAGE = wandering_voltage(800, seed=2)
+STRONG = {'latent_heat': {'latent': 0.5}, 'creep': {'c': 0.3}, 'resistance_change': {'eta': 0.2}}
 
 
 def table(trials=((0.0, 4.0, 2.0), (1.0, 5.0)), **columns):
@@ -128,6 +129,16 @@ def test_an_arm_at_rest_is_balanced_where_it_is_judged_and_where_an_input_turns(
     assert balanced[0] <= 8 and balanced[1] == 700
     Simulator(model, run, judged).run([], exact=True)
     assert balanced[2] == 700
+
+
+@pytest.mark.parametrize('name', ['latent_heat', 'resistance_change', 'creep'])
+def test_the_phase_counts_between_the_rows_that_are_judged(name):
+    model = bicep_model()
+    effect = effect_of(model, name, **{**STRENGTHS[name], **STRONG.get(name, {})})
+    run = arm_run(np.concatenate([np.linspace(0.0, 6.0, 200), np.linspace(6.0, 2.5, 40)]), 0.1)
+    judged = np.array([run.rows - 1])
+    found, whole = (Simulator(model, run, rows).run([effect])[judged] for rows in (judged, None))
+    np.testing.assert_allclose(found, whole, rtol=0.0, atol=1e-3)
 
 
 def test_a_sensor_effect_that_does_not_say_what_it_reads_gets_all_rows():
