@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
-from hysteresis_ros.diagnosis import significance
+from hysteresis_ros.diagnosis import bench_selection, significance
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
 from hysteresis_ros.diagnosis.diagnose import diagnose
@@ -123,6 +123,16 @@ def test_a_gain_that_chance_could_give_is_no_answer(monkeypatch):
         monkeypatch.setattr(significance, 'paired_p_values',
                             lambda gains, *rest: np.full(len(gains), p_value))
         assert found_in(table(lagging)).missing == missing
+
+
+@pytest.mark.parametrize('share, missing', [(0.99, ['thermal_lag']), (1.0, [])])
+def test_what_too_few_trials_name_again_cannot_be_determined(monkeypatch, share, missing):
+    """All four do here, which is not more than all."""
+    monkeypatch.setattr(bench_selection, 'NAMED_AGAIN', share)
+    found = found_in(table(lagging))
+    assert found.missing == missing
+    reason = found.not_excited.get('thermal_lag', '')
+    assert ('cannot be determined here: with one load left out' in reason) != bool(missing)
 
 
 def test_creep_of_a_polymer_shows_and_is_plausible():
