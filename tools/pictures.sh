@@ -16,7 +16,7 @@ mkdir -p "$folder"
 "$python" tools/arm_picture.py "$folder/arm.png"
 cp "$folder/demo/demo.png" docs/demo.png
 cp "$folder/hidden/demo.png" docs/hidden.png
-"$python" tools/studio_picture.py "$folder/studio" "$folder/studio.png"
+PYTHONPATH=".:test${PYTHONPATH:+:$PYTHONPATH}" "$python" tools/studio_picture.py "$folder/studio" "$folder/studio.png"
 cp "$folder/arm.png" docs/arm.png
 cp "$folder/studio.png" docs/studio.png
 echo 'docs/demo.png docs/hidden.png docs/arm.png docs/studio.png'

@@ -3,8 +3,8 @@
 """
 Take a picture of the studio after a diagnosis and a fit: `studio_picture.py FOLDER studio.png`.
 
-Needs the extra `studio` and Chromium, which is driven as in the tests. FOLDER takes the example
-that the studio makes.
+Needs the extra `studio` and Chromium, which is driven as in the tests, so that PYTHONPATH is to
+name the checkout and `test`. FOLDER takes the example that the studio makes.
 """
 
 from pathlib import Path
@@ -16,12 +16,9 @@ import sys
 import tempfile
 import time
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
+from browser_support import Browser, find_browser, MISSING
 
-from browser_support import Browser, find_browser, MISSING  # noqa: E402
-
-from hysteresis_ros.share import share_path  # noqa: E402
+from hysteresis_ros.share import share_path
 
 WIDTH, HEIGHT, PATIENCE = 1280, 780, 120.0
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 import errno
+import importlib
 import os
 import socket
 from typing import Any, TYPE_CHECKING
@@ -35,7 +36,7 @@ def require_framework() -> None:
         If it is not installed; it says how to install it.
     """
     try:
-        import nicegui  # noqa: F401
+        importlib.import_module('nicegui')
     except ImportError as error:
         raise ParameterError(MISSING.format(name=error.name or 'nicegui')) from None
 
