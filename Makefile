@@ -132,7 +132,9 @@ fuzz: $(VENV)/made
 
 # The times in docs/safety.md; a machine that does something else makes them longer.
 faults: build
-	@$(IN_WORKSPACE) $(VENV)/bin/python tools/faults.py docs/safety.md
+	@$(MAKE) -s -C firmware machine
+	@$(IN_WORKSPACE) HYSTERESIS_ROS_AVR="$$PWD/firmware/build" \
+		$(VENV)/bin/python -m tools.faults docs/safety.md
 
 clean:
 	rm -rf firmware/build .venv* .workspace* build install log dist demo *.egg-info

@@ -7,6 +7,8 @@ No exception, the same lines however the bytes are cut, no frame whose CRC is wr
 that telemetry or a greeting could make of a frame but numbers or a `ProtocolError`.
 """
 
+import re
+
 from hysteresis_ros.bridge.messages import Identity, Telemetry
 from hysteresis_ros.bridge.protocol import Decoder, Frame, Line
 from hysteresis_ros.errors import ProtocolError
@@ -91,5 +93,6 @@ def _outcome(line: Line) -> str:
             found.append(read.__qualname__)
         except ProtocolError as error:
             # The sentence without kind and value, which are as many as there are inputs.
-            found.append(str(error).partition(' with')[2].partition('=')[0] or str(error)[-30:])
+            text = str(error).partition(' with')[2].partition('=')[0] or str(error)
+            found.append(re.sub(r'[-0-9.]+', '', text)[-30:])
     return ','.join(found)
