@@ -8,16 +8,14 @@ from collections.abc import Callable, Iterator
 import contextlib
 import os
 from pathlib import Path
-import select
 import signal
 import subprocess
 import sys
-import threading
 import time
-import tty
 
 from hysteresis_ros.laboratory.board.cable import Cable
 from hysteresis_ros.laboratory.board.chip import Chip
+from hysteresis_ros.laboratory.board.terminal import PortOnTerminal
 from tools.faults.run import BOARDS, LatePort, url_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,54 +37,13 @@ while True:
 """
 
 
-class OnTerminal:
-    """
-    The simulated board behind a pseudo-terminal, for a host in another process.
-
-    Attributes
-    ----------
-    simulated : SimulatedPort
-        The board.
-    name : str
-        Of the device.
-    """
-
-    def __init__(self) -> None:
-        self.simulated = LatePort('sim://bicep')
-        self._far, near = os.openpty()
-        tty.setraw(near)
-        self.name = os.ttyname(near)
-        self._near = near       # stays open here, so that hosts may come and go
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-
-    def _serve(self) -> None:
-        while not self._ended.is_set():
-            if select.select([self._far], [], [], 0.0)[0]:
-                self.simulated.write(os.read(self._far, 4096))
-            data = self.simulated.read(4096, 0.01)
-            if data and select.select([], [self._far], [], 0.0)[1]:
-                os.write(self._far, data)
-
-    def __enter__(self) -> OnTerminal:
-        self.simulated.open()
-        self._thread.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._ended.set()
-        self._thread.join()
-        self.simulated.close()
-        os.close(self._far)
-        os.close(self._near)
-
-
 @contextlib.contextmanager
 def board_on_terminal(scheme: str) -> Iterator[tuple[str, Cable]]:
     """Give a board's terminal and its cable; ``sim`` or ``avr``."""
     if scheme == 'sim':
-        with OnTerminal() as terminal:
-            yield terminal.name, terminal.simulated.cable
+        port = LatePort(url_of('sim'))
+        with PortOnTerminal(port) as terminal:
+            yield terminal.name, port.cable
         return
     chip = Chip(url_of('avr'))
     try:

@@ -5,16 +5,15 @@
 from __future__ import annotations
 
 import collections
-import os
 import threading
 import time
-import tty
 
 from hysteresis_ros.laboratory.board.cable import Cable
 from hysteresis_ros.laboratory.board.chip_board import ChipBoard
 from hysteresis_ros.laboratory.board.port import CableUnplugged
 from hysteresis_ros.laboratory.board.simavr import Simavr
 from hysteresis_ros.laboratory.board.simulated_board import TICK
+from hysteresis_ros.laboratory.board.terminal import Terminal
 from hysteresis_ros.laboratory.board.url import make_plant, parse_url
 
 PAUSE = 0.002           # s of the wall between two looks at the chip
@@ -51,7 +50,7 @@ class Chip:
         self.cable, self.arm = Cable(board, simulation), arm
         self._others: collections.deque[bytes] = collections.deque()
         self._changing = threading.Lock()   # of the terminal, which goes with the cable
-        self._ends: tuple[int, int] | None = None
+        self._terminal: Terminal | None = None
         self._plug()
         self._thread = threading.Thread(target=self._live, name='arm of the chip', daemon=True)
         self._thread.start()
@@ -68,9 +67,9 @@ class Chip:
 
         """
         with self._changing:
-            if self._ends is None:
+            if self._terminal is None:
                 raise CableUnplugged('the cable is unplugged')
-            return os.ttyname(self._ends[1])
+            return self._terminal.name
 
     def write(self, data: bytes) -> None:
         """Send bytes to the board as another program on the same port would."""
@@ -104,40 +103,23 @@ class Chip:
         if not self.cable.plugged:
             self._unplug()
             return
-        self._plug()
-        self._say(bytes(self.cable.received))
+        self._plug().write(bytes(self.cable.received))
         self.cable.received.clear()
 
     def _heard(self) -> bytes:
-        data = b''
+        data = b'' if self._terminal is None else self._terminal.read()
         while self._others:
             data += self._others.popleft()
-        if self._ends is None:
-            return data
-        try:
-            return data + os.read(self._ends[0], 4096)
-        except BlockingIOError:
-            return data
+        return data
 
-    def _say(self, data: bytes) -> None:
-        assert self._ends is not None
-        try:
-            os.write(self._ends[0], data)
-        except BlockingIOError:
-            pass        # nobody reads: a real line loses it, too
-
-    def _plug(self) -> None:
-        """Have a terminal; its near end stays open here, so that hosts may come and go."""
+    def _plug(self) -> Terminal:
         with self._changing:
-            if self._ends is None:
-                self._ends = os.openpty()
-                tty.setraw(self._ends[1])
-                os.set_blocking(self._ends[0], False)
+            if self._terminal is None:
+                self._terminal = Terminal()
+            return self._terminal
 
     def _unplug(self) -> None:
-        """Have none: whoever uses it finds it gone."""
         with self._changing:
-            if self._ends is not None:
-                for end in self._ends:
-                    os.close(end)
-                self._ends = None
+            if self._terminal is not None:
+                self._terminal.close()
+                self._terminal = None
