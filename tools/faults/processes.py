@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import math
 import os
 from pathlib import Path
 import signal
@@ -15,6 +16,7 @@ import time
 
 from hysteresis_ros.laboratory.board.cable import Cable
 from hysteresis_ros.laboratory.board.chip import Chip
+from hysteresis_ros.laboratory.board.simulated_board import TICK
 from hysteresis_ros.laboratory.board.terminal import PortOnTerminal
 from tools.faults.run import BOARDS, LatePort, url_of
 
@@ -22,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HOSTS = {signal.SIGKILL: 'host killed while hot', signal.SIGSTOP: 'host stopped while hot'}
 NODES = {'compensator_node': 'compensator node dies in mid-run',
          'geometry_node': 'geometry node dies in mid-run'}
+WATCHED = 1.0           # s of the arm after a host was silenced
 STARTUP = 300.0         # s of the wall in which nodes must have started; they compile at first
 
 # A host that heats until it dies.
@@ -35,6 +38,16 @@ while True:
     board.set_voltage(5.5)
     time.sleep(0.05)
 """
+
+
+def _last_heated(cable: Cable, begun: float) -> float:
+    """Return when a board was last heated within a second; inf where it still is then."""
+    last = begun
+    while cable.time < begun + WATCHED:
+        if cable.board.duty > 0.0:
+            last = cable.time + TICK / 1000.0
+        time.sleep(0.002)
+    return last if cable.board.duty == 0.0 else math.inf
 
 
 @contextlib.contextmanager
@@ -61,8 +74,7 @@ def silence_host(number: signal.Signals, scheme: str = 'sim') -> float:
             wait_for(lambda: cable.board.duty > 0.2, 'heating')
             begun = cable.time
             child.send_signal(number)
-            wait_for(lambda: cable.board.duty == 0.0, 'zero duty')
-            return cable.time - begun
+            return _last_heated(cable, begun) - begun
         finally:
             child.kill()
             child.wait()
