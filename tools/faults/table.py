@@ -83,7 +83,7 @@ def rows_of(outcomes: dict[str, dict[str, Outcome]]) -> list[Row]:
 
 def table(rows: list[Row]) -> str:
     """Return the rows as Markdown; times in seconds, rounded up."""
-    lines = ['| fault | how it is injected | zero duty after [s], '
+    lines = ['| fault | how it is injected | zero duty after [s]: '
              + ' | '.join(BOARDS.values()) + ' | what the user reads |', '|---|---|---|---|---|']
     for row in rows:
         times = [_written(row.times[board], row.counted_from) for board in BOARDS]
