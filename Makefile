@@ -128,6 +128,7 @@ firmware:
 
 fuzz: $(VENV)/made
 	@$(MAKE) -s -C firmware fuzz RUNS=$(RUNS) $(FUZZ_ARGS)
+	@mkdir -p $(WORKSPACE)/build
 	@$(VENV)/bin/python -m tools.fuzz_decoder --runs $(RUNS) --crash $(WORKSPACE)/build/crash
 
 # The times in docs/safety.md; a machine that does something else makes them longer.
