@@ -10,6 +10,7 @@ BENCHMARK_ARGS ?=
 HIDDEN_ARGS ?=
 PYTEST_ARGS ?=
 FUZZ_ARGS ?=
+RUNS ?= 1000000
 
 # The wheels of ROS 2 set this variable, and with it the library path, for one environment only.
 ifdef _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -62,7 +63,7 @@ help:
 	@echo 'make docs       the pages of docs/ with the programming interface, into build/docs'
 	@echo 'make pictures   the pictures of docs/ and of the README, made anew'
 	@echo 'make firmware   machine code for the board, see firmware/README.md'
-	@echo 'make fuzz       both parsers fed with what breaks them; FUZZ_ARGS=RUNS=10000000'
+	@echo 'make fuzz       both parsers fed with what breaks them; RUNS=10000000'
 	@echo 'make faults     the table of docs/safety.md, measured anew'
 	@echo 'make build      the workspace alone; make demo builds it, too'
 	@echo 'make clean      remove all that make made'
@@ -126,13 +127,15 @@ firmware:
 	@echo 'firmware/build/firmware.hex'
 
 fuzz: $(VENV)/made
-	@$(MAKE) -s -C firmware fuzz $(FUZZ_ARGS)
-	@$(VENV)/bin/python tools/fuzz_decoder.py -runs=100000 -max_len=512 -verbosity=0 \
-		-artifact_prefix=$(WORKSPACE)/build/
+	@$(MAKE) -s -C firmware fuzz RUNS=$(RUNS) $(FUZZ_ARGS)
+	@mkdir -p $(WORKSPACE)/build
+	@$(VENV)/bin/python -m tools.fuzz_decoder --runs $(RUNS) --crash $(WORKSPACE)/build/crash
 
 # The times in docs/safety.md; a machine that does something else makes them longer.
 faults: build
-	@$(IN_WORKSPACE) $(VENV)/bin/python tools/faults.py docs/safety.md
+	@$(MAKE) -s -C firmware machine
+	@$(IN_WORKSPACE) HYSTERESIS_ROS_AVR="$$PWD/firmware/build" \
+		$(VENV)/bin/python -m tools.faults docs/safety.md
 
 clean:
 	rm -rf firmware/build .venv* .workspace* build install log dist demo *.egg-info

@@ -7,13 +7,13 @@ The simulated board lives faster than the wall's clock; a fault comes every minu
 whatever it switches off is enabled again. All that is measured goes into a bag, which is read then.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 import random
 import tempfile
 import time
 from typing import Any
 
+from benchmark.watched_arm import CABLE, memory, WatchedArm
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -30,12 +30,6 @@ SETPOINTS, QUICK_SETPOINTS = 1_000_000, 2_000
 BURST = 40                  # setpoints between two pauses
 PAUSE = 0.001               # s
 TELEMETRY_PERIOD = 1.0      # s of the arm
-TICK = 0.02                 # s of the arm, of the simulated board
-TROUBLES = ('unplug', 'silent', 'deaf', 'late', 'mad', 'frozen', 'supply_low', 'supply_off',
-            'supply_double', 'encoder_still')
-GAP, DURATION = (20.0, 60.0), (1.0, 60.0)           # s of the arm, between faults and of one
-# Bytes that are spoiled in both directions, all the time.
-CABLE = 'drop=0.0005&flip=0.0005&double=0.0005&garbage=0.01'
 PATIENCE = 30.0             # times of the wall that it may take, for a machine that is slow
 
 
@@ -56,12 +50,13 @@ def endurance_benchmarks(quick: bool) -> dict:
         with open_bag(Path(folder, 'bag')) as bag:
             found = sum(1 for _ in bag.messages(list(bag.topics)))
     return {
-        'endurance_arm_time_s': run.arm_time, 'endurance_setpoints_count': run.setpoints,
-        'endurance_faults_count': run.faults, 'endurance_enabled_again_count': run.enabled_again,
+        'endurance_arm_time_s': run.arm.time, 'endurance_setpoints_count': run.setpoints,
+        'endurance_faults_count': run.arm.faults,
+        'endurance_enabled_again_count': run.enabled_again,
         'endurance_published_count': run.published,
         'endurance_lost_in_the_bag_count': run.published - found,
-        'endurance_heated_ratio': run.heated,
-        'endurance_missed_watchdogs_count': run.missed,
+        'endurance_heated_ratio': run.arm.heated,
+        'endurance_missed_watchdogs_count': run.arm.missed,
         'endurance_memory_growth_MB': run.growth / 1e6}
 
 
@@ -76,96 +71,53 @@ class Run:
 
     Attributes
     ----------
-    arm_time : float
-        In s.
-    setpoints, faults, enabled_again, published, missed : int
-        How many there were; `missed` counts the arm's ticks that were heated without a setpoint for
-        longer than the watchdog.
-    heated : float
-        Share of the time.
+    arm : WatchedArm
+        With its faults.
+    setpoints, enabled_again, published : int
+        How many there were.
     growth : float
         Of the process's memory in bytes, since a fifth of the time had passed.
     """
 
     def __init__(self, folder: Path) -> None:
-        self.setpoints = self.faults = self.enabled_again = self.published = self.missed = 0
-        self.growth = self.arm_time = self.heated = 0.0
+        self.setpoints = self.enabled_again = self.published = 0
+        self.growth = 0.0
         self._rng = random.Random(1)
         self._bag = Bag(folder)
-        self._timeouts = Timeouts(watchdog=0.5)
-        self._board = Board(f'sim://bicep?speed={SPEED:g}&{CABLE}', timeouts=self._timeouts,
+        timeouts = Timeouts(watchdog=0.5)
+        self._board = Board(f'sim://bicep?speed={SPEED:g}&{CABLE}', timeouts=timeouts,
                             telemetry_period=TELEMETRY_PERIOD, on_sample=self._record)
         made = self._board._link._serial
         made.simulation = SimulatedPort(made.port)
-        self._cable: Any = made.simulation.cable
-        self._heated = 0        # ticks
-        self._heard = 0.0       # when a setpoint last reached the board [s of the arm]
-        self._watch()
+        self.arm = WatchedArm(made.simulation.cable, timeouts.watchdog * SPEED, self._rng)
 
     def drive(self, arm_time: float, setpoints: int) -> None:
         """Ask for voltages until so much time of the arm has passed and so many were asked."""
         end = time.monotonic() + PATIENCE * arm_time / SPEED
         settled = 0
-        next_fault = 10.0
         with self._board as board:
             board.enable(True)
-            while self._cable.time < arm_time or self.setpoints < setpoints:
+            while self.arm.time < arm_time or self.setpoints < setpoints:
                 for _ in range(BURST):
                     board.set_voltage(self._rng.uniform(0.0, 5.0))
                     self.setpoints += 1
                 time.sleep(PAUSE)
-                if self._cable.time > next_fault:
-                    next_fault = self._disturb()
+                self.arm.disturb()
                 if not board.wanted:
                     board.clear_fault()
                     board.enable(True)
                     self.enabled_again += 1
-                if not settled and self._cable.time > 0.2 * arm_time:
+                if not settled and self.arm.time > 0.2 * arm_time:
                     settled = memory()
                 if time.monotonic() > end:
                     raise HysteresisError(
-                        f'endurance: only {self._cable.time:.0f} s of {arm_time:g} s and '
+                        f'endurance: only {self.arm.time:.0f} s of {arm_time:g} s and '
                         f'{self.setpoints} setpoints in time')
             self.growth = memory() - settled
-            self.arm_time = self._cable.time
-            self.heated = self._heated * TICK / self.arm_time
         self._bag.close()
-
-    def _disturb(self) -> float:
-        """Begin a fault; return when the next one is due [s of the arm]."""
-        trouble, duration = self._rng.choice(TROUBLES), self._rng.uniform(*DURATION)
-        self._cable._simulation.troubles[trouble] = self._cable.time, duration
-        self.faults += 1
-        return self._cable.time + duration + self._rng.uniform(*GAP)
 
     def _record(self, sample: Any) -> None:
         stamp = time.time_ns()
         self._bag.write('applied_voltage', stamp, Float64(data=sample.voltage))
         self._bag.write('joint_states', stamp, JointState(name=['elbow'], position=[sample.angle]))
         self.published += 2
-
-    def _watch(self) -> None:
-        """Look at each tick of the arm whether it is heated though nobody has asked for long."""
-        board = self._cable.board
-        longest = self._timeouts.watchdog * SPEED + 2.0 * TICK
-        receive: Callable[[bytes], None] = board.receive
-        advance: Callable[[float, float], None] = board.arm.advance
-
-        def hear(data: bytes) -> None:
-            if b'set ' in data:
-                self._heard = self._cable.time
-            receive(data)
-
-        def live(dt: float, voltage: float) -> None:
-            self._heated += board.duty > 0.0
-            if board.duty > 0.0 and self._cable.time - self._heard > longest:
-                self.missed += 1
-            advance(dt, voltage)
-
-        board.receive, board.arm.advance = hear, live
-
-
-def memory() -> int:
-    """Return how much memory this process has, in bytes."""
-    pages = int(Path('/proc/self/statm').read_text(encoding='ascii').split()[1])
-    return pages * 4096

@@ -24,7 +24,7 @@ SLOW = ('test_bench_diagnosis', 'test_demo', 'test_diagnose', 'test_faults',
 # wait for each other, so that continuous integration runs them with one set of versions.
 NODES = ('test_board', 'test_board_clocks', 'test_board_heat_and_cool', 'test_bridge_node',
          'test_commands', 'test_compensator_node', 'test_geometry_node', 'test_lifecycle',
-         'test_node_parameters', 'test_node_running', 'test_protection')
+         'test_node_parameters', 'test_node_running', 'test_protection', 'test_recording')
 
 # Tests of other runs on the same network must not be heard; rclpy reads this at its start.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')

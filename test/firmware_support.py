@@ -12,6 +12,9 @@ import pytest
 
 FIRMWARE = Path(__file__).resolve().parents[1] / 'firmware'
 PWM_STEPS = 1020
+# What runs the machine code, and how to see whether it is there.
+SIMAVR_TOOLS = {'gcc': 'gcc', 'make': 'make', 'avr-gcc': 'gcc-avr avr-libc', 'simavr': 'simavr'}
+SIMAVR_HEADER = Path('/usr/include/simavr/sim_avr.h')
 LINE_NONE, LINE_FRAME, LINE_REMARK = 0, 1, 2
 REASONS = {3: 'longer than 192 bytes', 4: 'no CRC at its end', 5: 'its CRC is wrong',
            6: 'not of the form "kind sequence key=value"',
@@ -41,6 +44,14 @@ class Number(ctypes.Structure):
     _fields_ = [('negative', ctypes.c_bool), ('has_point', ctypes.c_bool),
                 ('has_fraction', ctypes.c_bool), ('whole', ctypes.c_uint32),
                 ('millionths', ctypes.c_uint32)]
+
+
+def without_simavr():
+    """Return a mark that skips where the machine code cannot run, and says what to install."""
+    missing = [package for tool, package in SIMAVR_TOOLS.items() if shutil.which(tool) is None]
+    missing += [] if SIMAVR_HEADER.exists() else ['libsimavr-dev']
+    return pytest.mark.skipif(bool(missing), reason=f'sudo apt install {" ".join(missing)} runs '
+                              'the firmware in simavr')
 
 
 def make(*arguments):

@@ -13,6 +13,8 @@
 //   turn EDGES RATE     move the encoder at so many edges a second; EDGES may be negative
 //   supply MILLIVOLTS   of the muscle's supply
 //   stop 0|1            open the emergency stop's contact
+//   index COUNTS|off    where the encoder's index pulse is, within a turn
+//   clock MILLISECONDS  change the firmware's clock by so much
 //   reset               pull the chip's reset pin
 //   hang                an endless loop instead of the next instruction, until a reset
 //   history             ms:steps of each change of channel 1 so far
@@ -45,7 +47,6 @@
 #define QUEUE 65536
 #define HISTORY 4096
 #define TURN 8192                       // counts between two index pulses
-#define INDEX 2731                      // where they are
 
 // Addresses in the data memory of the ATmega328P.
 #define DDRB_ 0x24
@@ -64,7 +65,9 @@ static bool states_speed;
 static unsigned char queue[QUEUE];
 static unsigned queue_in, queue_out;
 
-static long counts, edges_left;
+static long counts, edges_left, index_place = 2731;
+static bool index_off;
+static unsigned clock_at;               // address of the firmware's milliseconds, 4 bytes
 static avr_cycle_count_t edge_cycles, next_edge;
 static unsigned supply = 12000;
 static int stop_open;
@@ -85,12 +88,17 @@ static double milliseconds(void)
 
 // Encoder
 
+static bool at_index(void)
+{
+    return !index_off && (counts - index_place) % TURN == 0;
+}
+
 static void set_tracks(void)
 {
     const int phase = counts & 3;
     avr_raise_irq(port_d[TRACK_A], phase == 1 || phase == 2);
     avr_raise_irq(port_d[TRACK_B], phase == 2 || phase == 3);
-    avr_raise_irq(port_d[INDEX_PIN], (counts - INDEX) % TURN == 0);
+    avr_raise_irq(port_d[INDEX_PIN], at_index());
 }
 
 static avr_cycle_count_t on_edge(avr_t *chip, avr_cycle_count_t when, void *unused)
@@ -260,7 +268,7 @@ static void wire(void)
     was_reset = false;
     drive_pin(TRACK_A, (counts & 3) == 1 || (counts & 3) == 2);
     drive_pin(TRACK_B, (counts & 3) >= 2);
-    drive_pin(INDEX_PIN, (counts - INDEX) % TURN == 0);
+    drive_pin(INDEX_PIN, at_index());
     drive_pin(STOP_PIN, stop_open);
     avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0), supply * 68 / 1068);
     avr_cycle_timer_register(avr, BYTE_CYCLES, on_byte, NULL);
@@ -274,6 +282,14 @@ static void hang(void)
     avr->flash[hung_at] = 0xFF;         // rjmp .-2
     avr->flash[hung_at + 1] = 0xCF;
     hung = true;
+}
+
+static void change_clock(long milliseconds)
+{
+    uint32_t now;
+    memcpy(&now, avr->data + clock_at, sizeof now);
+    now += (uint32_t)milliseconds;
+    memcpy(avr->data + clock_at, &now, sizeof now);
 }
 
 // Commands
@@ -304,7 +320,7 @@ static void print_history(void)
 
 static void obey(const char *line, double wall)
 {
-    long edges;
+    long edges, milliseconds;
     double rate;
     if (sscanf(line, "turn %ld %lf", &edges, &rate) == 2 && rate > 0) {
         turn(edges, rate);
@@ -312,6 +328,11 @@ static void obey(const char *line, double wall)
         avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0), supply * 68 / 1068);
     } else if (sscanf(line, "stop %d", &stop_open) == 1) {
         drive_pin(STOP_PIN, stop_open);
+    } else if (sscanf(line, "index %ld", &index_place) == 1 || !strncmp(line, "index off", 9)) {
+        index_off = !strncmp(line, "index off", 9);
+        avr_raise_irq(port_d[INDEX_PIN], at_index());
+    } else if (clock_at && sscanf(line, "clock %ld", &milliseconds) == 1) {
+        change_clock(milliseconds);
     } else if (!strncmp(line, "reset", 5)) {
         avr_reset(avr);
     } else if (!strncmp(line, "hang", 4)) {
@@ -394,6 +415,11 @@ static void make_chip(const char *path)
     avr->log = LOG_ERROR;       // it complains of timer 2's mode, which it does not know
     avr->frequency = FREQUENCY;
     avr_load_firmware(avr, &firmware);
+    for (unsigned i = 0; i < firmware.symbolcount; i++) {
+        if (!strcmp(firmware.symbol[i]->symbol, "milliseconds")) {
+            clock_at = firmware.symbol[i]->addr & 0xFFFF;   // data has an offset of 0x800000
+        }
+    }
     avr->frequency = FREQUENCY;
     core_reset = avr->reset;
     avr->reset = on_reset;

@@ -11,9 +11,8 @@ import sys
 from firmware_support import build_library, FIRMWARE, HostBoard, make
 from hysteresis_ros.bridge.messages import FAULTS
 import pytest
+from tools import firmware_stack
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'tools'))
-import firmware_stack  # noqa: E402  it is no module of the package
 
 HEADER = ('// Copyright 2026 hysteresis_ros contributors\n'
           '// SPDX-License-Identifier: Apache-2.0\n//\n')

@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The firmware's machine code, in simavr, on a pseudo-terminal, spoken to by the host's `Board`."""
 
+import functools
 import math
 import os
 from pathlib import Path
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import time
 
-from firmware_support import FIRMWARE, make, PWM_STEPS
+from firmware_support import FIRMWARE, make, PWM_STEPS, without_simavr
 from hysteresis_ros.bridge.board import Board
 from hysteresis_ros.bridge.board_link import Timeouts
 from hysteresis_ros.bridge.encoder import AMT103_COUNTS, Encoder
@@ -26,14 +26,7 @@ import pytest
 DEADLINE = 20.0             # s of the wall, for what the board does by its own clock
 SAFE = 600.0                # ms of the board's clock from a fault to duty 0
 HARNESS = Path(__file__).with_name('simavr_board.c')
-# What is needed, and how to see whether it is there.
-NEEDED = {'gcc': 'gcc', 'make': 'make', 'avr-gcc': 'gcc-avr avr-libc', 'simavr': 'simavr'}
-MISSING = [package for tool, package in NEEDED.items() if shutil.which(tool) is None]
-if not Path('/usr/include/simavr/sim_avr.h').exists():
-    MISSING.append('libsimavr-dev')
-
-pytestmark = pytest.mark.skipif(
-    bool(MISSING), reason=f'sudo apt install {" ".join(MISSING)} runs the firmware in simavr')
+pytestmark = without_simavr()
 
 # By the wall's clock, which a busy machine lets run far ahead of the simulated chip's.
 PATIENT = Timeouts(setpoint=60.0, telemetry=10.0, late=10.0, greeting=10.0)
@@ -151,6 +144,12 @@ def drive(host, machine, steps):
     until(lambda: machine.pwm == [steps] * 3, f'{steps} steps, it is {machine.pwm}')
 
 
+def shows_duty(host, duty):
+    """Return whether the latest telemetry is of this duty."""
+    sample = host.status.sample
+    return sample.voltage == pytest.approx(duty * sample.supply, abs=1e-4)
+
+
 def counts(sample):
     return round(sample.angle / (2.0 * math.pi) * AMT103_COUNTS)
 
@@ -170,8 +169,7 @@ def test_setpoints_reach_all_three_gates_exactly(host, machine):
     """Off is off; on the third channel it is the mean over four ms."""
     for steps in (0, 300, 700, PWM_STEPS, 1, 0):
         drive(host, machine, steps)
-        until(lambda: host.status.sample.voltage == pytest.approx(  # noqa: B023
-            steps / PWM_STEPS * host.status.sample.supply, abs=1e-4), 'telemetry')
+        until(functools.partial(shows_duty, host, steps / PWM_STEPS), 'telemetry')
 
 
 @pytest.mark.parametrize('rate', [26000, 60000, 100000])
@@ -293,8 +291,8 @@ def test_the_port_avr_says_what_it_needs(monkeypatch):
     monkeypatch.setenv('HYSTERESIS_ROS_AVR', '/nowhere')
     with Board('avr://bicep') as host:
         until(lambda: "make demo DEMO_ARGS='--port avr://'" in host.status.problem, 'the reason')
-    with pytest.raises(ParameterError, match='avr:// takes speed'):
-        Board('avr://bicep?drop=0.1')
+    with pytest.raises(ParameterError, match='avr:// has a supply of 12 V'):
+        Board('avr://bicep?supply=24')
 
 
 def test_a_reset_in_the_middle_of_a_frame_obeys_neither_half(machine):

@@ -3,6 +3,7 @@
 """Parameters of the nodes: declared once, described, refused with the reason."""
 
 import math
+import re
 import signal
 
 from node_support import Graph, process, small_model
@@ -18,6 +19,7 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import linkage as laboratory
 from hysteresis_ros.nodes import (
     bridge_node, compensator_node, geometry_node, marker_node, monitor_node)
+from hysteresis_ros.nodes.bridge_parameters import PARAMETERS, PROTECTION
 from hysteresis_ros.nodes.parameters import (
     check_limits, GEOMETRY, NAMES, Parameters, Spec, VOLTAGE_LIMITS)
 
@@ -180,3 +182,21 @@ def test_a_misspelt_parameter_is_pointed_out(domain_id):
         child.send_signal(signal.SIGTERM)
         assert child.wait(timeout=30) == 0
     assert 'payload_mas is not known' in line and 'did you mean payload_mass?' in line
+
+
+def test_the_limits_that_protect_the_muscle_are_on_their_page(root):
+    """Each of them with its default, and the README names some and leads there."""
+    page = (root / 'docs' / 'safety.md').read_text(encoding='utf-8')
+    limits, = re.findall(r'## What the muscle stands\n(.*?)\n## ', page, re.DOTALL)
+    for spec in PROTECTION:
+        assert f'`{spec.name}`' in limits, spec.name
+        default = str(spec.default).lower() if spec.default is True else f'{spec.default:g}'
+        line, = (line for line in limits.splitlines() if f'`{spec.name}`' in line)
+        assert re.search(rf'(?<![\d.]){default}\b', line), spec.name
+    readme = (root / 'README.md').read_text(encoding='utf-8')
+    item, = re.findall(r'\* \*\*Limits\*\*:(.*?)\n\* ', readme, re.DOTALL)
+    named = set(re.findall(r'`(\w+)`', item)) - {'bridge_node', 'false'}
+    assert named <= {spec.name for spec in PARAMETERS}
+    assert {'rms_voltage_limit', 'maximum_temperature', 'full_heat_time', 'soft_start_time',
+            'encoder_check', 'angle_latency'} <= named
+    assert '(docs/safety.md)' in item

@@ -284,6 +284,8 @@ def parse_line(line: bytes) -> Line | None:
 
 def _printable(data: bytes, length: int = 60) -> str:
     text = data[:length].decode('ascii', 'backslashreplace')
+    if text.isprintable():
+        return text[:length]
     return ''.join(c if c.isprintable() else f'\\x{ord(c):02x}' for c in text)[:length]
 
 

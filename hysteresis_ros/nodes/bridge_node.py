@@ -86,7 +86,7 @@ class BridgeNode(ManagedNode):
         self._wall = Clock(clock_type=ClockType.STEADY_TIME)
         # (is it so?, future, wall time until which to wait)
         self._waiting: list[tuple[Callable[[Status], bool], Any, float]] = []
-        self._taken = self._refused = 0
+        self._taken = self._refused = self._published = 0
         self._bad_lines = (0, -BAD_LINES_SHOWN_FOR)
         self._joints = self.create_publisher(JointState, 'joint_states', MEASUREMENTS)
         self._voltages = self.create_publisher(Float64, 'applied_voltage', MEASUREMENTS)
@@ -268,15 +268,18 @@ class BridgeNode(ManagedNode):
         if not self._works:
             return
         self._voltages.publish(Float64(data=sample.voltage))
+        self._published += 1
         if sample.fresh:
             message = JointState(name=[self._settings['joint_name']], position=[sample.angle],
                                  velocity=[sample.velocity])
             message.header.stamp = stamp
             self._joints.publish(message)
+            self._published += 1
         if sample.ambient is not None:
             message = Temperature(temperature=sample.ambient)
             message.header.stamp = stamp
             self._ambients.publish(message)
+            self._published += 1
         with self._lock:
             if self._cycle is not None:
                 self._heat_and_cool(board, self._cycle, sample)
@@ -408,7 +411,8 @@ class BridgeNode(ManagedNode):
             'connections': status.connections, 'frames': status.frames,
             'bad lines': status.bad_lines, 'lost frames': status.lost_frames,
             'latest refusal of the board': status.refusal or 'none',
-            'setpoints taken': self._taken, 'setpoints refused': self._refused})
+            'setpoints taken': self._taken, 'setpoints refused': self._refused,
+            'measurements published': self._published})
         sample = status.sample
         if sample is not None:
             values.update({

@@ -11,5 +11,8 @@ COMMANDS = QoSProfile(depth=10000, reliability=ReliabilityPolicy.RELIABLE)
 # Measurements: reliable, because a recording or a prediction with gaps is worth less.
 MEASUREMENTS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
+# For who records them: the depth bridges a pause of 20 s at 500 messages a second here, too.
+RECORDED = QoSProfile(depth=10000, reliability=ReliabilityPolicy.RELIABLE)
+
 # For who looks at the latest measurement only: what it has missed is not made up for.
 LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

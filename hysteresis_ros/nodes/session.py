@@ -27,15 +27,15 @@ from std_srvs.srv import Trigger
 from diagnostic_msgs.msg import DiagnosticArray
 
 from hysteresis_ros.errors import BoardError, ParameterError
-from hysteresis_ros.nodes.qos import COMMANDS, MEASUREMENTS
+from hysteresis_ros.nodes.qos import COMMANDS, RECORDED
 
 TOPICS = {
     'target_angle': ('std_msgs/msg/Float64', Float64, COMMANDS),
     'muscle_reference': ('sensor_msgs/msg/JointState', JointState, COMMANDS),
     'voltage_setpoint': ('std_msgs/msg/Float64', Float64, COMMANDS),
-    'applied_voltage': ('std_msgs/msg/Float64', Float64, MEASUREMENTS),
-    'joint_states': ('sensor_msgs/msg/JointState', JointState, MEASUREMENTS),
-    'ambient_temperature': ('sensor_msgs/msg/Temperature', Temperature, MEASUREMENTS),
+    'applied_voltage': ('std_msgs/msg/Float64', Float64, RECORDED),
+    'joint_states': ('sensor_msgs/msg/JointState', JointState, RECORDED),
+    'ambient_temperature': ('sensor_msgs/msg/Temperature', Temperature, RECORDED),
     '/diagnostics': ('diagnostic_msgs/msg/DiagnosticArray', DiagnosticArray, 10),
 }
 # Wall seconds within which a process has to answer.

@@ -7,6 +7,7 @@ from typing import Any
 import serial
 
 from hysteresis_ros.laboratory.board.chip import Chip
+from hysteresis_ros.laboratory.board.port import CableUnplugged
 
 
 class Serial(serial.Serial):
@@ -32,9 +33,14 @@ class Serial(serial.Serial):
         ------
         ParameterError
             If the programs are missing or the URL makes no sense.
+        SerialException
+            If the simulated cable is unplugged.
 
         """
         if self.chip is None:
             self.chip = Chip(self._port)
-        self.portstr = self.chip.terminal
+        try:
+            self.portstr = self.chip.terminal
+        except CableUnplugged as error:
+            raise serial.SerialException(str(error)) from None
         super().open()

@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 import collections
+from collections.abc import Callable
 import random
-from typing import TYPE_CHECKING
+from typing import Generic, Protocol, TYPE_CHECKING, TypeVar
 
-from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
+from hysteresis_ros.laboratory.board.simulated_board import TICK
 
 LATE = 0.5      # s by which bytes are late, where that is asked for
 FLOOD = 20      # random bytes in each tick of a flood, twice what the line can carry
@@ -17,20 +18,52 @@ if TYPE_CHECKING:
     from hysteresis_ros.laboratory.board.url import Simulation
 
 
-class Cable:
+class CabledBoard(Protocol):
+    """
+    What a cable needs of the board at its far end.
+
+    Attributes
+    ----------
+    troubled : callable
+        Whether a trouble is there now, by its name; the cable sets it.
+
+    """
+
+    troubled: Callable[[str], bool]
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host."""
+
+    def transmit(self) -> bytes:
+        """Give the bytes that go to the host."""
+
+    def advance(self, ticks: int = 1) -> None:
+        """Let so many `TICK` ms pass."""
+
+    def idle(self, ticks: int) -> None:
+        """Let them pass while the cable is pulled."""
+
+    def start(self) -> None:
+        """Start anew, as the cable is put back."""
+
+
+Board = TypeVar('Board', bound=CabledBoard)
+
+
+class Cable(Generic[Board]):
     """
     The way between host and board, with its faults.
 
     Parameters
     ----------
-    board : SimulatedBoard
+    board : CabledBoard
         At the far end.
     simulation : Simulation
         Which faults, and when.
 
     """
 
-    def __init__(self, board: SimulatedBoard, simulation: Simulation) -> None:
+    def __init__(self, board: Board, simulation: Simulation) -> None:
         self.board = board
         self.received = bytearray()     # what the host can read
         self._simulation = simulation

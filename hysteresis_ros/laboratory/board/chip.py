@@ -1,39 +1,27 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The firmware's machine code in simavr, with an arm of the virtual laboratory on its pins.
-
-The chip is another program, ``simavr_board``, which is built from the checkout's ``test`` folder
-(`make -C firmware machine`) and found in the folder that ``HYSTERESIS_ROS_AVR`` names. It reads
-commands and answers them; its serial port is a pseudo-terminal. What its gates get heats the arm,
-and its encoder pins are turned as the arm turns.
-"""
+"""The firmware's machine code in simavr with an arm on it, behind a cable and a pseudo-terminal."""
 
 from __future__ import annotations
 
-import math
-import os
-from pathlib import Path
-import re
-import subprocess
+import collections
 import threading
 import time
 
-from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory.board.cable import Cable
+from hysteresis_ros.laboratory.board.chip_board import ChipBoard
+from hysteresis_ros.laboratory.board.port import CableUnplugged
+from hysteresis_ros.laboratory.board.simavr import Simavr
+from hysteresis_ros.laboratory.board.simulated_board import TICK
+from hysteresis_ros.laboratory.board.terminal import Terminal
 from hysteresis_ros.laboratory.board.url import make_plant, parse_url
 
-FOLDER = 'HYSTERESIS_ROS_AVR'
-PROGRAM, FIRMWARE = 'simavr_board', 'firmware.elf'
-TICK = 0.02             # s; dt of the arm
-PWM_STEPS = 1020        # of the firmware
-SUPPLY = 12.0           # V, that of simavr_board
-PAUSE = 0.004           # s of the wall between two looks at the chip
-SLOWEST_EDGES = 2000.0  # edges a second with which the encoder is turned, at least
+PAUSE = 0.002           # s of the wall between two looks at the chip
 
 
 class Chip:
     """
-    A simulated chip and an arm that live together, as long as this object.
+    A simulated chip, an arm and a cable that live together, until this object is closed.
 
     Parameters
     ----------
@@ -42,10 +30,10 @@ class Chip:
 
     Attributes
     ----------
+    cable : Cable
+        With board and arm at its far end.
     arm : Arm
         Of the virtual laboratory.
-    terminal : str
-        Name of the device that its serial port is.
 
     Raises
     ------
@@ -56,54 +44,82 @@ class Chip:
 
     def __init__(self, url: str) -> None:
         simulation = parse_url(url)
-        folder = Path(os.environ.get(FOLDER, ''))
-        programs = [folder / PROGRAM, folder / FIRMWARE]
-        if not os.environ.get(FOLDER) or not all(path.exists() for path in programs):
-            raise ParameterError(
-                f'port {url}: {FOLDER} has to name the folder with {PROGRAM} and {FIRMWARE}; '
-                "`make demo DEMO_ARGS='--port avr://'` sees to that in a checkout")
-        self.arm = make_plant(simulation).arm
-        self._start = self.arm.encoder_counts
-        self._process = subprocess.Popen(
-            [*map(str, programs), f'{simulation.speed:g}'], stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, text=True, bufsize=1)
-        assert self._process.stdin is not None and self._process.stdout is not None
-        self._in, self._out = self._process.stdin, self._process.stdout
-        # simavr talks about what it loads first.
-        self.terminal = next((line.split()[1] for line in self._out if line.startswith('port ')),
-                             'a simulated chip that did not start')
-        self._lived = 0.0       # s of the arm
+        arm = make_plant(simulation).arm
+        self._chip = Simavr(url, simulation.speed)
+        board = ChipBoard(self._chip, arm, simulation)
+        self.cable, self.arm = Cable(board, simulation), arm
+        self._others: collections.deque[bytes] = collections.deque()
+        self._changing = threading.Lock()   # of the terminal, which goes with the cable
+        self._terminal: Terminal | None = None
+        self._plug()
         self._thread = threading.Thread(target=self._live, name='arm of the chip', daemon=True)
         self._thread.start()
 
+    @property
+    def terminal(self) -> str:
+        """
+        Name of the device that its serial port is.
+
+        Raises
+        ------
+        CableUnplugged
+            If there is none, as the cable is unplugged.
+
+        """
+        with self._changing:
+            if self._terminal is None:
+                raise CableUnplugged('the cable is unplugged')
+            return self._terminal.name
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to the board as another program on the same port would."""
+        self._others.append(data)
+
     def close(self) -> None:
         """Switch the chip off."""
-        self._process.kill()
-        self._process.wait()
+        self._chip.close()
         self._thread.join()
-
-    def _tell(self, command: str) -> str:
-        self._in.write(command + '\n')
-        return self._out.readline()
 
     def _live(self) -> None:
         try:
-            while self._process.poll() is None:
+            while self._chip.runs:
                 self._follow()
                 time.sleep(PAUSE)
         except OSError:
             pass        # the chip was switched off between two words
+        self._unplug()
+        self._chip.free()
 
     def _follow(self) -> None:
-        """Let the arm live as long as the chip has, and turn the encoder to where it is then."""
-        state = {key: float(value) for key, value in
-                 re.findall(r'(\w+)=(-?[0-9.]+)', self._tell('state'))}
-        if 'pwm1' not in state or state['ms'] / 1000.0 < self._lived + TICK:
+        """Let the arm live as long as the chip has, and carry what both sides say."""
+        self.cable.write(self._heard())
+        state = self._chip.state()
+        if 'pwm1' not in state:
             return
-        voltage = SUPPLY * math.sqrt(state['connected'] * state['pwm1'] / PWM_STEPS)
-        while self._lived + TICK <= state['ms'] / 1000.0:
-            self.arm.advance(TICK, voltage)
-            self._lived += TICK
-        edges = self.arm.encoder_counts - self._start - int(state['counts'])
-        if edges:
-            self._tell(f'turn {edges} {max(abs(edges) / TICK, SLOWEST_EDGES):.0f}')
+        self.cable.board.look(state)
+        while self.cable.time + TICK / 1000.0 <= state['ms'] / 1000.0:
+            self.cable.tick()
+        self.cable.board.turn(state)
+        if not self.cable.plugged:
+            self._unplug()
+            return
+        self._plug().write(bytes(self.cable.received))
+        self.cable.received.clear()
+
+    def _heard(self) -> bytes:
+        data = b'' if self._terminal is None else self._terminal.read()
+        while self._others:
+            data += self._others.popleft()
+        return data
+
+    def _plug(self) -> Terminal:
+        with self._changing:
+            if self._terminal is None:
+                self._terminal = Terminal()
+            return self._terminal
+
+    def _unplug(self) -> None:
+        with self._changing:
+            if self._terminal is not None:
+                self._terminal.close()
+                self._terminal = None

@@ -22,6 +22,8 @@ from hysteresis_ros.bridge.messages import (
 from hysteresis_ros.bridge.protocol import (
     BadLine, decimal, Decoder, encode, Fields, Frame, integer, SEQUENCE_LIMIT, VERSION)
 from hysteresis_ros.errors import ProtocolError
+from hysteresis_ros.laboratory.board.encoder_troubles import (
+    COUNTS_PER_REVOLUTION, EncoderTroubles, INDEX_COUNTS)
 
 if TYPE_CHECKING:
     from hysteresis_ros.laboratory.arm import Arm
@@ -33,11 +35,8 @@ AMBIENT_PERIOD = 1000       # ms between two measurements of the ambient tempera
 REMARK_PERIOD = 200         # ms between two explanations for people
 LOWEST_SUPPLY = 4.0         # V below which the output is off
 PWM_STEPS = 65535
-INDEX_COUNTS = 2731         # the index pulse: at 120 degrees, within the range of the arm
-COUNTS_PER_REVOLUTION = 8192
 SUPPLY_NOISE = 0.01         # V, standard deviation of the supply's measurement
 
-JUMP_COUNTS = 5 * COUNTS_PER_REVOLUTION // 2   # of an encoder that jumps
 CLOCK_JUMP = 60000          # ms by which a clock jumps back
 # Share of the nominal supply in each trouble of it.
 SUPPLY_TROUBLES = {'supply_low': 0.6, 'supply_off': 0.0, 'supply_double': 2.0}
@@ -66,7 +65,7 @@ class SimulatedBoard:
     clock_back : float, optional
         Time in s at which the board's clock jumps back by `CLOCK_JUMP`.
     encoder_jump : float, optional
-        Time in s at which the encoder jumps by `JUMP_COUNTS`.
+        Time in s at which the encoder jumps by two turns and a half.
 
     Attributes
     ----------
@@ -89,9 +88,7 @@ class SimulatedBoard:
         self.arm = arm
         self.troubled: Callable[[str], bool] = lambda name: False
         self._clock_back = 1000.0 * clock_back
-        self._encoder_jump = 1000.0 * encoder_jump
-        self._still = self._turned = 0      # counts at which the encoder stands, or turned round
-        self._was_still = self._was_reversed = False
+        self._encoder = EncoderTroubles(encoder_jump)
         self._nominal_supply = supply
         self._random = random.Random(seed)
         self._speed = speed
@@ -219,18 +216,8 @@ class SimulatedBoard:
 
     def _encoder_counts(self) -> int:
         """Return the counts of the encoder with its troubles."""
-        counts = self.arm.encoder_counts
-        if self.troubled('encoder_still'):
-            if not self._was_still:
-                self._still = counts
-            counts = self._still
-        self._was_still = self.troubled('encoder_still')
-        if self.troubled('encoder_reversed'):
-            if not self._was_reversed:
-                self._turned = counts
-            counts = 2 * self._turned - counts
-        self._was_reversed = self.troubled('encoder_reversed')
-        return counts + (JUMP_COUNTS if self._world_time >= self._encoder_jump else 0)
+        return self._encoder.counts(self.arm.encoder_counts, self._world_time / 1000.0,
+                                    self.troubled)
 
     def _look_at_supply(self) -> None:
         if self.supply < LOWEST_SUPPLY:

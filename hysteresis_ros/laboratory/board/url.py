@@ -3,7 +3,9 @@
 """
 What ``sim://bicep?key=value&...`` asks for: speed, seed, faults, and physical effects of the arm.
 
-``avr://bicep?...``, the firmware in simavr on the same arm, takes those that are not the board's.
+``avr://bicep?...``, the firmware in simavr on the same arm, takes all but another supply voltage.
+There the board has a supply of its own: it goes on while the cable is pulled, and starts anew when
+the cable is put back, as an Arduino does.
 
 =============== ===================================================================================
 key             meaning
@@ -61,8 +63,6 @@ from hysteresis_ros.laboratory.plant import Plant
 SCHEME = 'sim'
 CHIP = 'avr'                # the firmware in simavr on the same arm
 ARM = 'bicep'
-# What the chip can be asked for: neither faults nor another supply.
-CHIP_KEYS = ('speed', 'seed', 'recording', 'recording_time', 'time_constant', 'muscle')
 
 TROUBLES = ('unplug', 'silent', 'deaf', 'late', 'mad', 'frozen', 'encoder_still',
             'encoder_reversed', 'index_missing', 'supply_low', 'supply_off', 'supply_double',
@@ -140,9 +140,8 @@ def parse_url(url: str) -> Simulation:
         if key in given:
             raise ParameterError(f'port {url}: {key} is given twice')
         given.add(key)
-        if chip and key not in CHIP_KEYS and key not in EFFECTS:
-            raise ParameterError(f'port {url}: {CHIP}:// takes {", ".join(CHIP_KEYS)} and the '
-                                 f'effects, not {key!r}')
+        if chip and key == 'supply':
+            raise ParameterError(f'port {url}: {CHIP}:// has a supply of 12 V')
         trouble, _, end = key.rpartition('_')
         if trouble in TROUBLES and end in ('after', 'for'):
             begin, duration = troubles.get(trouble, (math.inf, math.inf))
