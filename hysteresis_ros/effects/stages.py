@@ -178,6 +178,10 @@ class MechanismEffect(Effect):
         """
         return 0.0, 0.0, 0.0
 
+    def capstan(self) -> float:
+        """Return mu phi, by whose exponential the muscles' cables change a tension in motion."""
+        return 0.0
+
     @property
     def moves(self) -> bool:
         """Whether the arm's own velocity or acceleration counts."""
