@@ -34,7 +34,8 @@ STRENGTHS = {
     'payload_error': {'dm': 15.0}, 'clamp_mass': {'moment': 0.6, 'phi': 0.4},
     'geometry_error': {'dx': 0.6, 'da': -0.4, 'dz': 0.3},
     'end_stop': {'stop': 1.9, 'side': 1.0, 'stiffness': 5.0},
-    'encoder_offset': {'offset': 2.0}, 'backlash': {'B': 2.0}, 'latency': {'delay': 0.35},
+    'encoder_offset': {'offset': 2.0}, 'encoder_eccentricity': {'e': 3.0, 'phi': 1.0},
+    'backlash': {'B': 2.0}, 'latency': {'delay': 0.35},
 }
 
 

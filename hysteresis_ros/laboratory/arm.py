@@ -313,7 +313,8 @@ class Arm:
                 self._history.popleft()
 
     def _seen(self) -> float:
-        return self._played + self.conditions.encoder_offset + sum(
+        seen = self.conditions.disc.reading(self._played)
+        return seen + self.conditions.encoder_offset + sum(
             one.reading(self.time, self.angle) for one in self.conditions.disturbances)
 
 

@@ -10,6 +10,7 @@ import dataclasses
 import math
 
 from hysteresis_ros.laboratory.cable import Cable
+from hysteresis_ros.laboratory.encoder_disc import EncoderDisc
 from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.heat import HeatBalance, ROOM
 from hysteresis_ros.laboratory.linkage import Linkage
@@ -132,6 +133,8 @@ class Conditions:
         the arm; side 0: no stop.
     encoder_offset, backlash, latency : float
         Of the encoder [rad], [rad], [s].
+    disc : EncoderDisc
+        What the encoder reads.
     disturbances : list of Disturbance
         Whatever else acts.
     recording_time : float
@@ -162,6 +165,7 @@ class Conditions:
     encoder_offset: float = 0.0
     backlash: float = 0.0
     latency: float = 0.0
+    disc: EncoderDisc = EncoderDisc()
     disturbances: list = dataclasses.field(default_factory=list)
     recording_time: float = 900.0
 

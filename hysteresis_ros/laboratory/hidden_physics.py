@@ -18,6 +18,7 @@ import numpy as np
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.cable import Cable
 from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.encoder_disc import EncoderDisc
 from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
 from hysteresis_ros.laboratory.unlisted import Unlisted, UNLISTED
 from hysteresis_ros.spelling import unknown
@@ -212,6 +213,12 @@ def _encoder_offset(conditions: Conditions, size: float, specimen: np.random.Gen
     conditions.encoder_offset = math.radians(9.0) * size
 
 
+def _encoder_eccentricity(conditions: Conditions, size: float, specimen: np.random.Generator,
+                          recording: np.random.Generator) -> None:
+    conditions.disc = EncoderDisc(off_centre=0.0012 * size,
+                                  direction=specimen.uniform(-math.pi, math.pi))
+
+
 def _backlash(conditions: Conditions, size: float, specimen: np.random.Generator,
               recording: np.random.Generator) -> None:
     conditions.backlash = math.radians(8.0) * size
@@ -280,6 +287,8 @@ def _disturb(kind: type[Unlisted]) -> Apply:
 LATER = {
     'cable_friction': Effect('The cables between wires and forearm rub on their guides.',
                              _cable_friction),
+    'encoder_eccentricity': Effect("The encoder's disc sits off the centre of its shaft.",
+                                   _encoder_eccentricity),
 }
 
 EFFECTS = {**LISTED, **{name: Effect(kind.__doc__ or '', _disturb(kind), listed=False)
