@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 GRID = math.radians(0.1)
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
+# Load [N] over which the slope of what the transformation feels is taken.
+SMALL_LOAD = 1e-3
 # Longest dt of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
 # would not be stable.
 LONGEST_PHASE = 0.7
@@ -198,7 +200,7 @@ def _line(statics: Statics, leverage: np.ndarray, friction: float, base: float, 
     load, weight = 0.0 * force, 0.0 * force
     if loaded:
         load = chain.load_inside(force)
-        weight = chain.load_inside(force + 1.0) - load
+        weight = (chain.load_inside(force + SMALL_LOAD) - load) / SMALL_LOAD
     scale = chain.scale(force) + 0.0 * force
     demand = (statics.length - base - chain.stretch(force)) / scale
     # Past a fold, where the arm would fall, the nearest stable state is kept.

@@ -263,7 +263,7 @@ def undetermined(effect: Effect, kind: str) -> list[str]:
     """Return which parameters of a fitted effect have intervals that span their whole range."""
     found = []
     for parameter in effect.parameters:
-        if parameter.choices or kind not in parameter.kinds:
+        if parameter.choices or parameter.form or kind not in parameter.kinds:
             continue
         low, high = effect.intervals.get(parameter.name, (math.nan, math.nan))
         least, most = (-parameter.high if parameter.both_signs else parameter.low), parameter.high
