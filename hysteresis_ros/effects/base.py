@@ -52,7 +52,8 @@ class Parameter:
     kinds : tuple of str
         Kinds of measurement, 'arm' or 'bench', on which it is fitted; else it keeps its value.
     form : bool
-        Whether it tells forms of one equation apart, so that the effect is known without it.
+        Whether it tells forms of one equation apart, so that the effect is known without it. The
+        neutral one is the simplest form, and stays where it was chosen.
     limits : (float, float), optional
         What the value cannot pass by its nature; default the range widened.
     """

@@ -108,8 +108,9 @@ class StressDependentStrain(MaterialEffect):
     parameters = (
         Parameter('r', '1', 'share of the strain that is missing without load', 0.02, 1.0, 0.0,
                   (0.3, 0.8), limits=(0.0, 1.0), kinds=('bench',)),
+        # Beyond 5 mean loads the growth is a straight line over the bench's loads, whatever F0 is.
         Parameter('F0', 'loads', "load scale of the saturation over the bench's mean load",
-                  0.1, 3.0, 1.0, (0.5, 1.5), log=True, kinds=('bench',)),
+                  0.1, 5.0, 1.0, (0.5, 1.5), log=True, limits=(0.02, 4.99), kinds=('bench',)),
         Parameter('growth', '1', 'growth of the strain with the load against that on the bench',
                   0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',)),)
 
