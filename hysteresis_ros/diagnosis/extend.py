@@ -240,19 +240,18 @@ def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Mea
 def _fitted_together(fitter: BenchFitter, added: Sequence[Effect], known: Sequence[Effect]
                      ) -> list[Effect]:
     """Return the better fit of effects of a bench, with the simplest forms that do."""
-    kind, located = fitter.problem.kind, set()
-    if known:
-        rivals = [fitter.fit(effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
-                  for effects in (known, added)]
-        added = fitter.with_intervals(min(rivals, key=lambda fit: (
-            len(fit.implausible()), fitter.error(fit.predicted))))
-        vague = {effect.id for effect in added if undetermined(effect, kind)}
-        located = {effect.id for effect in known
-                   if effect.id in vague and not undetermined(effect, kind)}
-        if located:
-            # What only held-out rows have determined is not fitted again.
-            added = known
-    return simplest_forms(fitter, added, located)
+    added, kind = simplest_forms(fitter, added), fitter.problem.kind
+    if not known:
+        return added
+    rivals = [fitter.fit(effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
+              for effects in (known, added)]
+    added = fitter.with_intervals(min(rivals, key=lambda fit: (
+        len(fit.implausible()), fitter.error(fit.predicted))))
+    vague = {effect.id for effect in added if undetermined(effect, kind)}
+    located = {effect.id for effect in known
+               if effect.id in vague and not undetermined(effect, kind)}
+    # What only held-out rows have determined is not fitted again.
+    return simplest_forms(fitter, known if located else added, located)
 
 
 def _unobservable(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],

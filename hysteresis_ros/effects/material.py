@@ -28,12 +28,12 @@ class StressDependence(MaterialEffect):
 
     id = 'stress_dependence'
     sentence = 'Load shifts the transformation to higher temperatures (Clausius-Clapeyron).'
-    equation = ('T -> T - sigma / C: H2[F - C T], where V^2 stands for T in a heated wire; where '
-                "1 / C grows with the bench's strain S: F -> F (1 + follows (S(F) - 1)); "
+    equation = ('T -> T - sigma / C: H2[F - C T], where V^2 stands for T in a heated wire; '
+                "where 1 / C grows with the bench's strain S: F -> F (1 + follows (S(F) - 1)); "
                 'on the arm alone: F -> F + shift (F - Fp), Fp = 0 where C is known, else Fm')
-    source = ('Clausius-Clapeyron relation of shape memory alloys, dT / dsigma in proportion to the '
-              'strain (Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155) or constant '
-              '(Brinson 1993); Eq. 2 of the paper')
+    source = ('Clausius-Clapeyron relation of shape memory alloys: dT / dsigma in proportion to '
+              'the strain (Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155) or constant '
+              '(Brinson, J. Intell. Mater. Syst. Struct. 4 (1993) 229); Eq. 2 of the paper')
     shows_in = 'load at the same drive'
     experiment = 'the same loop under three or more loads'
     confused_with = ('supply_sag', 'series_compliance')
