@@ -29,11 +29,13 @@ STRENGTHS = {
     'r_phase': {'strain': 0.2, 'position': 0.2, 'width': 0.05},
     'creep': {'c': 0.1, 't0': 3.0}, 'fatigue': {'b': 0.05, 'a': 0.02}, 'slack': {'Ls': 0.5},
     'unequal_muscles': {'shorter': 0.6, 'longer': 0.9}, 'coulomb_friction': {'tau_c': 0.02},
-    'viscous_friction': {'b': 0.5}, 'inertia': {'I': 0.01}, 'frame_tilt': {'phi': 4.0},
+    'cable_friction': {'mu_phi': 0.1}, 'viscous_friction': {'b': 0.5}, 'inertia': {'I': 0.01},
+    'frame_tilt': {'phi': 4.0},
     'payload_error': {'dm': 15.0}, 'clamp_mass': {'moment': 0.6, 'phi': 0.4},
     'geometry_error': {'dx': 0.6, 'da': -0.4, 'dz': 0.3},
     'end_stop': {'stop': 1.9, 'side': 1.0, 'stiffness': 5.0},
-    'encoder_offset': {'offset': 2.0}, 'backlash': {'B': 2.0}, 'latency': {'delay': 0.35},
+    'encoder_offset': {'offset': 2.0}, 'encoder_eccentricity': {'e': 3.0, 'phi': 1.0},
+    'backlash': {'B': 2.0}, 'latency': {'delay': 0.35},
 }
 
 

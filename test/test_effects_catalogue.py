@@ -43,6 +43,8 @@ EXPECTED = {
     'unequal_muscles': ('material', 'smeared knees', 'one muscle at a time',
                         {'slack', 'geometry_error'}),
     'coulomb_friction': ('mechanism', 'reversals', 'tap', {'backlash'}),
+    'cable_friction': ('mechanism', 'in proportion to the load', 'another payload',
+                       {'coulomb_friction', 'backlash'}),
     'viscous_friction': ('mechanism', 'dtheta/dt', 'swing', {'thermal_lag', 'latency'}),
     'inertia': ('mechanism', 'ringing', 'pluck', {'viscous_friction'}),
     'payload_error': ('mechanism', 'gravity curve', 'scale', {'frame_tilt', 'supply_sag'}),
@@ -52,6 +54,8 @@ EXPECTED = {
     'frame_tilt': ('mechanism', 'cos theta', 'spirit level', {'payload_error', 'encoder_offset'}),
     'end_stop': ('mechanism', 'one end of theta', 'into the stop', {'slack'}),
     'encoder_offset': ('sensor', 'constant', 'hard stop', {'geometry_error'}),
+    'encoder_eccentricity': ('sensor', 'an offset and a scale', 'without its muscles',
+                             {'encoder_offset', 'geometry_error'}),
     'backlash': ('sensor', 'reversals', 'by hand', {'coulomb_friction'}),
     'latency': ('sensor', 'dtheta/dt', 'chirp', {'thermal_lag'}),
 }
@@ -64,10 +68,12 @@ RANGES = {
     ('creep', 'c'): ('% of l0', 0.01, 0.5), ('slack', 'Ls'): ('mm', 0.1, 5.0),
     ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),
     ('coulomb_friction', 'tau_c'): ('N m', 0.001, 0.150),
+    ('cable_friction', 'mu_phi'): ('1', 0.005, 1.0),
     ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 5., 100.),
     # A clamp of 50 g, too: the base model's own error alone may look like 10 g.
     ('clamp_mass', 'moment'): ('g m', 5.0 * 0.020, 50.0 * 0.050),
     ('geometry_error', 'dx'): ('mm', 0.5, 5.0), ('frame_tilt', 'phi'): ('deg', 1.0, 25.0),
+    ('encoder_eccentricity', 'e'): ('deg', 0.2, 10.0),
     ('encoder_offset', 'offset'): ('deg', 0.2, 15.0), ('backlash', 'B'): ('deg', 0.2, 12.0),
     ('latency', 'delay'): ('s', 0.005, 5.0),
 }

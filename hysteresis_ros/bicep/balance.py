@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 GRID = math.radians(0.1)
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
+# Load [N] over which the slope of what the transformation feels is taken.
+SMALL_LOAD = 1e-3
 # Longest dt of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
 # would not be stable.
 LONGEST_PHASE = 0.7
@@ -64,7 +66,11 @@ class ArmBalance:
         resistances = [effect.resistance() for effect in chain.mechanism]
         self.coulomb, self.viscous, self.inertia = (
             float(sum(values)) for values in zip((0.0, 0.0, 0.0), *resistances))
+        self.capstan = float(sum(effect.capstan() for effect in chain.mechanism))
+        sticks = self.coulomb > 0.0 or self.capstan > 0.0
         leverage = geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6)
+        # What the arm gets of a tension while it sinks; its inverse while it rises.
+        grip = math.exp(self.capstan)
         self.base = operator.output_range[0]
         self.has_dynamics = chain.moves
         # Range of H2's input, in the unit of the load.
@@ -72,23 +78,25 @@ class ArmBalance:
         compliance = chain.compliance()
         several = len(chain.offsets) > 1
         wires, self.operators, memories = wires_of(operator, chain, loaded)
-        frictions = (0.0, self.coulomb, -self.coulomb) if self.coulomb > 0.0 else (0.0,)
-        lines = [_line(statics, leverage, friction, self.base, chain, loaded)
-                 for friction in frictions]
+        # At rest, and where the arm sinks and rises against dry friction.
+        senses = (0, 1, -1) if sticks else (0,)
+        lines = [_line(statics, leverage * grip ** sense, sense * self.coulomb, self.base, chain,
+                       loaded) for sense in senses]
         # Where the wires only stretch the arm is stiffest, and rings fastest.
-        stiffness = np.max(leverage * statics.moment_arm) / (compliance or wires.compliance)
+        stiffness = grip * np.max(leverage * statics.moment_arm) / (
+            compliance or wires.compliance)
         swings = self.has_dynamics and loaded and not several
-        loads, spacing = _muscle(chain, statics, leverage, LOADS if swings else 2)
+        loads, spacing = _muscle(chain, statics, leverage / grip, LOADS if swings else 2)
         self._arm = Arm(
             wires=wires,
             grid=np.column_stack([statics.theta, statics.length, statics.moment, leverage,
                                   *(column for line in lines for column in line)]),
             loads=loads, spacing=spacing, base=self.base, coulomb=self.coulomb,
-            viscous=self.viscous, inertia=self.inertia,
+            capstan=self.capstan, viscous=self.viscous, inertia=self.inertia,
             tolerance=1e-10 * self.span,
             longest=LONGEST_PHASE * math.sqrt(self.inertia / stiffness),
             heaviest=max(float(np.max(np.abs(statics.moment))), 1e-12),
-            calm=CALM_STEP * self.span,
+            calm=CALM_STEP * self.span, sticks=sticks,
             # The wires of unequal muscles stretch when the drive changes, even if the arm sticks.
             rigid=not several and all(np.array_equal(line[0], lines[0][0]) for line in lines),
             strained=any(np.any(line[3] != 1.0) for line in lines), dynamic=self.has_dynamics,
@@ -187,13 +195,14 @@ def _line(statics: Statics, leverage: np.ndarray, friction: float, base: float, 
 
     What the transformation has to give, without offset; the load that it feels; what a moment that
     resists motion takes off that load; what an offset counts; and the loop's width beyond H2's.
+    `leverage` (n,) [m] is the moment that all muscles make when each bears a load of one.
     """
     # A wire cannot push.
     force = np.maximum(statics.moment - friction, 0.0) / leverage
     load, weight = 0.0 * force, 0.0 * force
     if loaded:
         load = chain.load_inside(force)
-        weight = chain.load_inside(force + 1.0) - load
+        weight = (chain.load_inside(force + SMALL_LOAD) - load) / SMALL_LOAD
     scale = chain.scale(force) + 0.0 * force
     demand = (statics.length - base - chain.stretch(force)) / scale
     # Past a fold, where the arm would fall, the nearest stable state is kept.

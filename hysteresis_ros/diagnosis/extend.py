@@ -18,6 +18,7 @@ from hysteresis_ros.diagnosis.observable import may_differ, observable, present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.diagnosis.simplest_forms import simplest_forms
 from hysteresis_ros.effects import Effect, effect_class
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements.quantities import shown
@@ -230,18 +231,27 @@ def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Mea
     """
     problem, _, fits = _fitted(model, names, train)
     added, _ = fits[-1]
-    if known and problem.refits:
-        fitter = BenchFitter(problem.finer())
-        rivals = [fitter.fit(effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
-                  for effects in (known, added)]
-        added = fitter.with_intervals(min(rivals, key=lambda fit: (
-            len(fit.implausible()), fitter.error(fit.predicted))))
-        vague = {effect.id for effect in added if undetermined(effect, problem.kind)}
-        if any(effect.id in vague and not undetermined(effect, problem.kind) for effect in known):
-            # What only held-out rows have determined is not fitted again.
-            added = list(known)
+    if problem.refits:
+        added = _fitted_together(BenchFitter(problem.finer()), added, known)
     completed = problem.completed([*problem.model.effects, *added])
     return _stamped(completed, added, train, problem.kind), added
+
+
+def _fitted_together(fitter: BenchFitter, added: Sequence[Effect], known: Sequence[Effect]
+                     ) -> list[Effect]:
+    """Return the better fit of effects of a bench, with the simplest forms that do."""
+    added, kind = simplest_forms(fitter, added), fitter.problem.kind
+    if not known:
+        return added
+    rivals = [fitter.fit(effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
+              for effects in (known, added)]
+    added = fitter.with_intervals(min(rivals, key=lambda fit: (
+        len(fit.implausible()), fitter.error(fit.predicted))))
+    vague = {effect.id for effect in added if undetermined(effect, kind)}
+    located = {effect.id for effect in known
+               if effect.id in vague and not undetermined(effect, kind)}
+    # What only held-out rows have determined is not fitted again.
+    return simplest_forms(fitter, known if located else added, located)
 
 
 def _unobservable(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],
@@ -263,7 +273,7 @@ def undetermined(effect: Effect, kind: str) -> list[str]:
     """Return which parameters of a fitted effect have intervals that span their whole range."""
     found = []
     for parameter in effect.parameters:
-        if parameter.choices or kind not in parameter.kinds:
+        if parameter.choices or parameter.form or kind not in parameter.kinds:
             continue
         low, high = effect.intervals.get(parameter.name, (math.nan, math.nan))
         least, most = (-parameter.high if parameter.both_signs else parameter.low), parameter.high

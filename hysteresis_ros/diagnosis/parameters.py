@@ -16,7 +16,8 @@ class ParameterVector:
     The parameters of some effects that are fitted to one kind of measurement.
 
     Positive parameters over decades are moved on a logarithmic scale, all others in units of their
-    plausible range, so that every component has a size of about one.
+    plausible range, so that every component has a size of about one. The simplest form of an
+    equation stays as it is.
 
     Parameters
     ----------
@@ -30,7 +31,9 @@ class ParameterVector:
         self.effects = list(effects)
         self.entries = [(index, parameter) for index, effect in enumerate(self.effects)
                         for parameter in effect.parameters
-                        if kind in parameter.kinds and not parameter.choices]
+                        if kind in parameter.kinds and not parameter.choices
+                        and not (parameter.form
+                                 and effect.values[parameter.name] == parameter.neutral)]
         self.lower, self.upper = (
             np.array([_to_unit(parameter, parameter.bounds[side])
                       for _, parameter in self.entries]) for side in (0, 1))

@@ -51,6 +51,9 @@ class Parameter:
         For a parameter that is tried at these values instead of being fitted.
     kinds : tuple of str
         Kinds of measurement, 'arm' or 'bench', on which it is fitted; else it keeps its value.
+    form : bool
+        Whether it tells forms of one equation apart, so that the effect is known without it. The
+        neutral one is the simplest form, and stays where it was chosen.
     limits : (float, float), optional
         What the value cannot pass by its nature; default the range widened.
     """
@@ -67,6 +70,7 @@ class Parameter:
     choices: tuple[float, ...] = ()
     kinds: tuple[str, ...] = ('arm', 'bench')
     limits: tuple[float, float] | None = None
+    form: bool = False
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -29,8 +29,11 @@ class StressDependence(MaterialEffect):
     id = 'stress_dependence'
     sentence = 'Load shifts the transformation to higher temperatures (Clausius-Clapeyron).'
     equation = ('T -> T - sigma / C: H2[F - C T], where V^2 stands for T in a heated wire; '
+                "where 1 / C grows with the bench's strain S: F -> F (1 + follows (S(F) - 1)); "
                 'on the arm alone: F -> F + shift (F - Fp), Fp = 0 where C is known, else Fm')
-    source = 'Clausius-Clapeyron relation of shape memory alloys; Eq. 2 of the paper'
+    source = ('Clausius-Clapeyron relation of shape memory alloys: dT / dsigma in proportion to '
+              'the strain (Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155) or constant '
+              '(Brinson, J. Intell. Mater. Syst. Struct. 4 (1993) 229); Eq. 2 of the paper')
     shows_in = 'load at the same drive'
     experiment = 'the same loop under three or more loads'
     confused_with = ('supply_sag', 'series_compliance')
@@ -38,6 +41,10 @@ class StressDependence(MaterialEffect):
     universal = True
     SHIFT = Parameter('shift', '1', 'influence of the load against that in the bench model, less '
                       'one', 0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',))
+    # From Brinson (1993), where C is constant, to Lagoudas and others (2012), where it is not.
+    FOLLOWS = Parameter('follows', '1', 'share by which 1 / C is in proportion to the strain that '
+                        'grows with the load, as of Clausius-Clapeyron', 0.0, 1.0, 0.0, (0.5,),
+                        limits=(0.0, 1.0), kinds=('bench',), form=True)
     # Load per drive squared: of a 0.2 mm wire 5 to 15 MPa/K at 2 to 12 K/V^2, of others not known.
     RANGES: ClassVar[dict[tuple[str, str | None], tuple[str, float, float]]] = {
         ('voltage', 'force'): ('N/V^2', 0.2, 6.0), ('current', 'force'): ('N/A^2', 1.0, 1e3),
@@ -56,9 +63,15 @@ class StressDependence(MaterialEffect):
         starts = tuple(float(value) for value in np.geomspace(low, high, 5)[1:-1])
         return (Parameter('C', unit,
                           'load that shifts the transformation by one unit of drive squared',
-                          low, high, 0.0, starts, log=True, kinds=('bench',)), cls.SHIFT)
+                          low, high, 0.0, starts, log=True, kinds=('bench',)), cls.FOLLOWS,
+                cls.SHIFT)
 
-    parameters = (SHIFT,)
+    parameters = (FOLLOWS, SHIFT)
+
+    @property
+    def follows_strain(self) -> float:  # type: ignore[override]
+        """Return the share by which the shift follows the strain."""
+        return self.follows
 
     @property
     def load_per_drive_squared(self) -> float:  # type: ignore[override]
@@ -95,8 +108,9 @@ class StressDependentStrain(MaterialEffect):
     parameters = (
         Parameter('r', '1', 'share of the strain that is missing without load', 0.02, 1.0, 0.0,
                   (0.3, 0.8), limits=(0.0, 1.0), kinds=('bench',)),
+        # Beyond 5 mean loads the growth is a straight line over the bench's loads, whatever F0 is.
         Parameter('F0', 'loads', "load scale of the saturation over the bench's mean load",
-                  0.1, 3.0, 1.0, (0.5, 1.5), log=True, kinds=('bench',)),
+                  0.1, 5.0, 1.0, (0.5, 1.5), log=True, limits=(0.02, 4.99), kinds=('bench',)),
         Parameter('growth', '1', 'growth of the strain with the load against that on the bench',
                   0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',)),)
 
@@ -106,6 +120,11 @@ class StressDependentStrain(MaterialEffect):
         # A stroke of nothing could not be inverted.
         return np.maximum(on_bench + growth, 0.02) / max(
             1.0 - self.r * math.exp(-1.0 / self.F0), 0.02)
+
+    def strain_of_bench(self, load: Values, surroundings: Surroundings) -> Values:
+        """Return the strain under a load over that under the bench's mean load."""
+        missing = np.exp(-np.maximum(load, 0.0) / (self.F0 * surroundings.load))
+        return (1.0 - self.r * missing) / max(1.0 - self.r * math.exp(-1.0 / self.F0), 0.02)
 
     def stretch(self, load: Values, surroundings: Surroundings) -> Values:
         """Return what keeps the cold muscle's resting length, whatever the growth."""

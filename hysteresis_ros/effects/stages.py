@@ -77,6 +77,8 @@ class MaterialEffect(Effect):
     stage = 'material'
     # Load per drive squared that takes the place of the first stage; 0 leaves it as it is.
     load_per_drive_squared: float = 0.0
+    # Share, 0 to 1, by which the shift by the load is in proportion to `strain_of_bench`.
+    follows_strain: float = 0.0
     # Excess length [m] of each parallel muscle.
     offsets: tuple[float, ...] = (0.0,)
 
@@ -90,6 +92,10 @@ class MaterialEffect(Effect):
 
     def scale(self, load: Values, surroundings: Surroundings) -> Values:
         """Return S, the factor on the transformation strain under `load`."""
+        return 1.0 + 0.0 * load
+
+    def strain_of_bench(self, load: Values, surroundings: Surroundings) -> Values:
+        """Return the bench's transformation strain under a load over that under the mean load."""
         return 1.0 + 0.0 * load
 
     def stretch(self, load: Values, surroundings: Surroundings) -> Values:
@@ -177,6 +183,10 @@ class MechanismEffect(Effect):
             Coulomb moment [N m], viscous coefficient [N m s/rad], moment of inertia [kg m^2].
         """
         return 0.0, 0.0, 0.0
+
+    def capstan(self) -> float:
+        """Return mu phi, by whose exponential the muscles' cables change a tension in motion."""
+        return 0.0
 
     @property
     def moves(self) -> bool:

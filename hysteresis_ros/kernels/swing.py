@@ -4,9 +4,9 @@
 An arm in motion, over one dt.
 
 The muscle pulls with what the arm asks for at rest, less what friction and inertia take:
-``n F r(theta) = tau(theta) - tau_c - b dtheta/dt - I d2theta/dt2``. It gives way as always, so an
-acceleration also stretches what is elastic in it, and an arm that swings faster than its muscle
-shortens leaves the muscle loose.
+``n F r(theta) g = tau(theta) - tau_c - b dtheta/dt - I d2theta/dt2``, where g is what a cable makes
+of a tension of one. It gives way as always, so an acceleration also stretches what is elastic in
+it, and an arm that swings faster than its muscle shortens leaves the muscle loose.
 """
 
 import math
@@ -30,7 +30,7 @@ EXACT = 1e-9
 
 @lean
 def swing(arm: Arm, state: State, x: float, offset: float, factor: float, friction: float,
-          dt: float) -> tuple[int, float]:
+          grip: float, dt: float) -> tuple[int, float]:
     """
     Commit what the muscle does within dt and return the place at which the arm ends.
 
@@ -43,6 +43,8 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
         What time and use add to the elongation [m] and do to the stroke.
     friction : float
         Moment of dry friction against the motion [N m].
+    grip : float
+        Tension at the arm over that of the muscle.
     dt : float
         Time [s].
     """
@@ -54,12 +56,12 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
     slope = arm.viscous * (faster - speed) + arm.inertia * (more - acceleration)
     tolerance = LOOSER * arm.tolerance
     start = u = last_input(table, memory)
-    k, share, here = _lacking(arm, state, u, x, offset, factor, drag, slope)
+    k, share, here = _lacking(arm, state, u, x, offset, factor, drag, slope, grip)
     if abs(here) > tolerance:
         u = root.begin(motion, REST_SEARCH, u, here, here * motion[SWING_GAIN], -math.inf,
                        math.inf, tolerance)
         while root.searching(motion, REST_SEARCH):
-            k, share, missing = _lacking(arm, state, u, x, offset, factor, drag, slope)
+            k, share, missing = _lacking(arm, state, u, x, offset, factor, drag, slope, grip)
             u = root.proceed(motion, REST_SEARCH, missing)
         motion[SWING_GAIN] = min(max((u - start) / here, LEAST_GAIN), 1.5)
     if u + x < arm.loads[0, INSIDE]:
@@ -71,7 +73,7 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
 
 @lean
 def acceleration_at(arm: Arm, state: State, x: float, offset: float, factor: float, k: int,
-                    share: float, drag: float) -> float:
+                    share: float, drag: float, grip: float) -> float:
     """Return the angular acceleration [rad/s^2] of an arm at a place under a new x."""
     table, memory, motion = arm.wires.table, state.memories[0], state.motion
     wanted = grid.between(arm.grid, LENGTH, k, share)
@@ -86,12 +88,12 @@ def acceleration_at(arm: Arm, state: State, x: float, offset: float, factor: flo
             load, length = _muscle(arm, state, u, x, offset, factor)
             u = root.proceed(motion, REST_SEARCH, wanted - length)
     leverage = grid.between(arm.grid, LEVERAGE, k, share)
-    return (_needed(arm, k, share, drag, 0.0) - load) * leverage / arm.inertia
+    return (_needed(arm, k, share, drag, 0.0, grip) - load) * leverage * grip / arm.inertia
 
 
 @lean
 def _lacking(arm: Arm, state: State, u: float, x: float, offset: float, factor: float, drag: float,
-             slope: float) -> tuple[int, float, float]:
+             slope: float, grip: float) -> tuple[int, float, float]:
     """Return the place where the muscle with the input u is, and the load missing there."""
     load, length = _muscle(arm, state, u, x, offset, factor)
     k = grid.interval(arm.grid, LENGTH, length, int(state.motion[NEAR_LENGTH]))
@@ -99,7 +101,7 @@ def _lacking(arm: Arm, state: State, u: float, x: float, offset: float, factor: 
     share = (length - arm.grid[k - 1, LENGTH]) / (
         arm.grid[k, LENGTH] - arm.grid[k - 1, LENGTH])
     share = min(max(share, 0.0), 1.0)
-    return k, share, _needed(arm, k, share, drag, slope) - load
+    return k, share, _needed(arm, k, share, drag, slope, grip) - load
 
 
 @lean
@@ -139,9 +141,10 @@ def _pull(arm: Arm, k: int, share: float, drag: float, slope: float) -> float:
 
 
 @lean
-def _needed(arm: Arm, k: int, share: float, drag: float, slope: float) -> float:
-    """Return the load that the arm asks for there."""
-    return _pull(arm, k, share, drag, slope) / grid.between(arm.grid, LEVERAGE, k, share)
+def _needed(arm: Arm, k: int, share: float, drag: float, slope: float, grip: float) -> float:
+    """Return the load that the arm asks of the muscle there."""
+    return _pull(arm, k, share, drag, slope) / (
+        grid.between(arm.grid, LEVERAGE, k, share) * grip)
 
 
 @lean

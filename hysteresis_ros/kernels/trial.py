@@ -95,12 +95,12 @@ def _kick(arm: Arm, state: State, x: float, offset: float, factor: float) -> Non
     motion = state.motion
     velocity = motion[VELOCITY]
     # An arm that friction holds is not accelerated before it slides.
-    if not math.isnan(motion[ANGLE]) and (velocity != 0.0 or arm.coulomb == 0.0):
-        drag = arm.viscous * velocity
-        if velocity != 0.0:
-            drag += math.copysign(arm.coulomb, velocity)
+    if not math.isnan(motion[ANGLE]) and (velocity != 0.0 or not arm.sticks):
+        sense = 0.0 if velocity == 0.0 else math.copysign(1.0, velocity)
+        drag = arm.viscous * velocity + sense * arm.coulomb
         k, share = present(arm, motion)
-        motion[ACCELERATION] = acceleration_at(arm, state, x, offset, factor, k, share, drag)
+        motion[ACCELERATION] = acceleration_at(
+            arm, state, x, offset, factor, k, share, drag, math.exp(sense * arm.capstan))
 
 
 @lean
@@ -113,7 +113,7 @@ def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor:
     if not moving:
         dt = 0.0
     drag = 0
-    if arm.coulomb > 0.0:
+    if arm.sticks:
         # At the start the arm has sunk to where it rests, and friction has held it up.
         drag = direction(arm, state, x, offset, factor, dt) if begun else 1
         if drag == 0:
@@ -121,7 +121,8 @@ def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor:
             return motion[ANGLE]
     line = 2 if drag < 0 else drag
     if moving and arm.swings:
-        k, share = swing(arm, state, x, offset, factor, drag * arm.coulomb, dt)
+        k, share = swing(arm, state, x, offset, factor, drag * arm.coulomb,
+                         math.exp(drag * arm.capstan), dt)
     elif len(arm.wires.offsets) > 1:
         k, share = settle_bundle(arm, state, line, x, offset, factor, dt)
     else:

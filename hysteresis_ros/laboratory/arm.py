@@ -226,17 +226,20 @@ class Arm:
 
     def _find_balance(self, dt: float) -> None:
         conditions, old = self.conditions, self.angle
-        resistance = 0.0
-        if conditions.coulomb > 0.0:
-            surplus = self._pull(old) - self._needed(old)
-            if abs(surplus) <= conditions.coulomb:
+        cable, resistance, along = conditions.cable, 0.0, 1.0
+        if conditions.coulomb > 0.0 or cable.rubs:
+            pull, needed_here = self._pull(old), self._needed(old)
+            if cable.behind(pull) > needed_here + conditions.coulomb:
+                resistance, along = conditions.coulomb, cable.before(1.0)
+            elif cable.before(pull) < needed_here - conditions.coulomb:
+                resistance, along = -conditions.coulomb, cable.behind(1.0)
+            else:
                 self.muscle.commit(self.temperature, self.tensions)
                 return
-            resistance = math.copysign(conditions.coulomb, surplus)
         damping = conditions.viscous / dt
 
         def needed(theta: float) -> float:
-            return self._needed(theta) + resistance - damping * (theta - old)
+            return along * (self._needed(theta) + resistance - damping * (theta - old))
         self._rest_where(needed, old)
 
     def _rest_where(self, needed: Callable[[float], float], guess: float) -> None:
@@ -268,7 +271,9 @@ class Arm:
 
     def _settle_down(self) -> None:
         """Let the arm sink from above to where it rests, against friction if there is any."""
-        self._rest_where(lambda theta: self._needed(theta) - self.conditions.coulomb, self.angle)
+        left = self.conditions.cable.behind(1.0)
+        self._rest_where(
+            lambda theta: left * (self._needed(theta) - self.conditions.coulomb), self.angle)
 
     def _cool_under_load(self) -> None:
         """Heat fully and cool again with the arm's own load on the wires, which remember it."""
@@ -285,10 +290,13 @@ class Arm:
         damping = conditions.viscous or 2.0 * INNER_DAMPING * math.sqrt(
             TYPICAL_STIFFNESS * conditions.inertia)
         # The wires pull towards smaller angles.
-        moment = self._needed(self.angle) - self._pull(self.angle)
+        pull = self._pull(self.angle)
         self.muscle.commit(self.temperature, self.tensions)
-        momentum = conditions.inertia * self._velocity + dt * moment
-        held = min(abs(momentum), dt * conditions.coulomb)
+        momentum = conditions.inertia * self._velocity + dt * (self._needed(self.angle) - pull)
+        # Sinking, the cables hold the arm beside the wires; rising, they hold the wires.
+        cable = conditions.cable
+        rubbing = cable.before(pull) - pull if momentum > 0.0 else pull - cable.behind(pull)
+        held = min(abs(momentum), dt * (conditions.coulomb + rubbing))
         momentum -= math.copysign(held, momentum)
         self._velocity = momentum / (conditions.inertia + dt * damping)
         self.angle += dt * self._velocity
@@ -305,7 +313,8 @@ class Arm:
                 self._history.popleft()
 
     def _seen(self) -> float:
-        return self._played + self.conditions.encoder_offset + sum(
+        seen = self.conditions.disc.reading(self._played)
+        return seen + self.conditions.encoder_offset + sum(
             one.reading(self.time, self.angle) for one in self.conditions.disturbances)
 
 

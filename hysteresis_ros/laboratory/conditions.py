@@ -9,6 +9,8 @@ What an arm is really like: each value is that of a perfect arm unless an effect
 import dataclasses
 import math
 
+from hysteresis_ros.laboratory.cable import Cable
+from hysteresis_ros.laboratory.encoder_disc import EncoderDisc
 from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.heat import HeatBalance, ROOM
 from hysteresis_ros.laboratory.linkage import Linkage
@@ -124,11 +126,15 @@ class Conditions:
     coulomb, viscous, inertia : float
         Friction [N m], damping [N m s/rad] and moment of inertia [kg m^2]; no inertia: the arm
         follows at once.
+    cable : Cable
+        Between each wire and the forearm.
     stop, stop_side, stop_stiffness : float
         Angle [rad] beyond which, to larger (1) or smaller (-1) angles, a spring [N m/rad] meets
         the arm; side 0: no stop.
     encoder_offset, backlash, latency : float
         Of the encoder [rad], [rad], [s].
+    disc : EncoderDisc
+        What the encoder reads.
     disturbances : list of Disturbance
         Whatever else acts.
     recording_time : float
@@ -152,12 +158,14 @@ class Conditions:
     coulomb: float = 0.0
     viscous: float = 0.0
     inertia: float = 0.0
+    cable: Cable = Cable()
     stop: float = 0.0
     stop_side: int = 0
     stop_stiffness: float = 20.0
     encoder_offset: float = 0.0
     backlash: float = 0.0
     latency: float = 0.0
+    disc: EncoderDisc = EncoderDisc()
     disturbances: list = dataclasses.field(default_factory=list)
     recording_time: float = 900.0
 

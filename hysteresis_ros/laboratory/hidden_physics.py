@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory.cable import Cable
 from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.encoder_disc import EncoderDisc
 from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
 from hysteresis_ros.laboratory.unlisted import Unlisted, UNLISTED
 from hysteresis_ros.spelling import unknown
@@ -157,6 +159,11 @@ def _coulomb_friction(conditions: Conditions, size: float, specimen: np.random.G
     conditions.coulomb = 0.08 * size
 
 
+def _cable_friction(conditions: Conditions, size: float, specimen: np.random.Generator,
+                    recording: np.random.Generator) -> None:
+    conditions.cable = Cable(friction=0.15 * size, wrap=math.radians(90.0))
+
+
 def _viscous_friction(conditions: Conditions, size: float, specimen: np.random.Generator,
                       recording: np.random.Generator) -> None:
     conditions.viscous = 2.5 * size
@@ -204,6 +211,12 @@ def _end_stop(conditions: Conditions, size: float, specimen: np.random.Generator
 def _encoder_offset(conditions: Conditions, size: float, specimen: np.random.Generator,
                     recording: np.random.Generator) -> None:
     conditions.encoder_offset = math.radians(9.0) * size
+
+
+def _encoder_eccentricity(conditions: Conditions, size: float, specimen: np.random.Generator,
+                          recording: np.random.Generator) -> None:
+    conditions.disc = EncoderDisc(off_centre=0.0012 * size,
+                                  direction=specimen.uniform(-math.pi, math.pi))
 
 
 def _backlash(conditions: Conditions, size: float, specimen: np.random.Generator,
@@ -270,13 +283,21 @@ def _disturb(kind: type[Unlisted]) -> Apply:
     return apply
 
 
+# What was added later comes last: an effect's place is a part of the seed of its size.
+LATER = {
+    'cable_friction': Effect('The cables between wires and forearm rub on their guides.',
+                             _cable_friction),
+    'encoder_eccentricity': Effect("The encoder's disc sits off the centre of its shaft.",
+                                   _encoder_eccentricity),
+}
+
 EFFECTS = {**LISTED, **{name: Effect(kind.__doc__ or '', _disturb(kind), listed=False)
-                        for name, kind in UNLISTED.items()}}
+                        for name, kind in UNLISTED.items()}, **LATER}
 
 
 def hidden_effects() -> tuple[str, ...]:
     """Return the names of the effects that the catalogue has, too."""
-    return tuple(LISTED)
+    return (*LISTED, *LATER)
 
 
 def unlisted_effects() -> tuple[str, ...]:

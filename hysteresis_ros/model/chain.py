@@ -166,7 +166,14 @@ class Chain:
 
     def load_inside(self, load: Values) -> Values:
         """Return the load as the transformation feels it."""
-        return load + sum(effect.shift_load(load, self.surroundings) for effect in self.material)
+        shifted = load + sum(
+            effect.shift_load(load, self.surroundings) for effect in self.material)
+        share = sum(effect.follows_strain for effect in self.material)
+        if share == 0.0:
+            return shifted
+        strain = math.prod(effect.strain_of_bench(load, self.surroundings)
+                           for effect in self.material)
+        return shifted + share * load * (strain - 1.0)
 
     @property
     def plays(self) -> bool:

@@ -74,7 +74,8 @@ class Targets:
     def _hold(self, theta: float, true: float) -> Reference:
         geometry = self._geometry
         friction = sum(effect.resistance()[0] for effect in self._chain.mechanism)
-        if friction > 0.0:
+        capstan = sum(effect.capstan() for effect in self._chain.mechanism)
+        if friction > 0.0 or capstan > 0.0:
             true = self._with_direction(true)
         statics = Statics.of(geometry, np.array([true]))
         for effect in self._chain.mechanism:
@@ -87,7 +88,8 @@ class Targets:
             raise RangeError(f'nothing pulls the arm to the target angle {theta:.4f} rad; the '
                              'muscle would have to push')
         self._angle = true
-        force = max(moment - self._direction * friction, 0.0) / leverage
+        force = max(moment - self._direction * friction, 0.0) / (
+            leverage * math.exp(self._direction * capstan))
         return Reference(float(statics.length[0]), force)
 
     def _with_direction(self, true: float) -> float:
