@@ -265,12 +265,12 @@ class Selection:
         one they start at their values in that, which may be far away.
         """
         for _ in range(self.settings.most_effects):
-            names = next(iter(self.valid()), frozenset())
-            if len(names) < 2 or names in self._exchanged or not self.sufficient(names):
+            names, exchanged = self._to_exchange()
+            if len(names) < 2 or names in self._exchanged:
                 return
             self._exchanged.add(names)
             whole = self.fits[names]
-            for out in sorted(names):
+            for out in exchanged:
                 kept = [effect for effect in whole.effects if effect.id != out]
                 for rest in self.fitter.fit([kept], self._metric(), 0):
                     scored = self._linearised_at(dataclasses.replace(
@@ -282,6 +282,21 @@ class Selection:
                         for _, effects in order[:self.settings.refits]])
             self._refine(len(names))
             self._refine_best()
+
+    def _to_exchange(self) -> tuple[frozenset[str], list[str]]:
+        """
+        Return a set with those of its effects that others may have to take the place of.
+
+        All of the answer. Where there is none, but the most probable set of all would suffice,
+        those of it whose values are not physical: they stand for something else.
+        """
+        best = next(iter(self.valid()), frozenset())
+        if self.sufficient(best):
+            return best, sorted(best)
+        best = next(names for names in self.ranked() if names not in self._exchanged)
+        if not self.sufficient(best):
+            return frozenset(), []
+        return best, sorted({one.split('.')[0] for one in self.fits[best].implausible()})
 
     def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""

@@ -22,6 +22,7 @@ class EncoderEccentricity(SensorEffect):
     """
 
     id = 'encoder_eccentricity'
+    rowwise = True
     sentence = "The encoder's disc sits off the shaft's centre: its error is one wave a turn."
     equation = 'theta_m = theta + e sin(theta + phi)'
     source = 'geometry of an eccentric disc with one reading head, to first order in e'

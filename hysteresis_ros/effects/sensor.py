@@ -15,6 +15,7 @@ class EncoderOffset(SensorEffect):
     """The encoder's zero is not where it should be."""
 
     id = 'encoder_offset'
+    rowwise = True
     sentence = 'The encoder was zeroed at another angle than assumed.'
     equation = 'theta_m = theta + offset'
     source = 'incremental encoder'
@@ -38,15 +39,12 @@ class EncoderOffset(SensorEffect):
         """Take the offset away."""
         return response - math.radians(self.offset)
 
-    def rows_read(self, asked: np.ndarray, inputs: Inputs) -> np.ndarray:
-        """Each row reads its own."""
-        return asked
-
 
 class Backlash(SensorEffect):
     """Play between shaft and encoder."""
 
     id = 'backlash'
+    rowwise = True
     sentence = 'The encoder stands still until the play at its coupling is used up.'
     equation = 'play operator of width B between shaft and encoder'
     source = 'play operator'
@@ -94,10 +92,6 @@ class Backlash(SensorEffect):
             self._target = response
         # Not a turn yet: the furthest target goes on to count.
         return self._target + self._lead
-
-    def rows_read(self, asked: np.ndarray, inputs: Inputs) -> np.ndarray:
-        """Each row reads its own, and remembers turns alone."""
-        return asked
 
 
 class Latency(SensorEffect):

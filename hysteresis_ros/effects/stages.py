@@ -203,6 +203,8 @@ class SensorEffect(Effect):
 
     stage = 'sensor'
     kinds: ClassVar[tuple[str, ...]] = ('arm', 'bench')
+    # Whether a row's measured response depends on its true one and on earlier turns alone.
+    rowwise: ClassVar[bool] = False
     # A turn of the wanted response up to this does not turn what the inverse adds by direction.
     dead_band: float = 0.0
 
@@ -239,9 +241,9 @@ class SensorEffect(Effect):
         Returns
         -------
         ndarray of bool, shape (rows,)
-            All, if the effect does not say otherwise.
+            All, if the effect is not `rowwise`.
         """
-        return np.ones_like(asked)
+        return asked if self.rowwise else np.ones_like(asked)
 
     def inverse(self, response: float) -> float:
         """Return the true response that is measured as `response`."""
