@@ -10,6 +10,7 @@ import pytest
 from scipy import special, stats
 
 from hysteresis_ros.diagnosis import events
+from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import sensitivity
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -188,6 +189,22 @@ def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
     assert found.valid()[0] == {'airflow', 'payload_error'}
     found._exchange()
     assert found.fits[planted].log_evidence == pytest.approx(before, abs=1.0)
+
+
+def test_what_is_not_physical_is_exchanged_for_what_it_stands_for(monkeypatch):
+    """A fan that would have to blow harder than any does is the sag."""
+    model = bicep_model(metrics={'length': {'verification': {'rmse': 0.0001}}})
+    planted = frozenset(['payload_error', 'supply_sag'])
+    found = selection(model, recording(model, [
+        effect_of(model, 'payload_error', dm=-15.0), effect_of(model, 'supply_sag', Rs=0.8)]),
+        [*TRIED, 'airflow'])
+    before = found.fits.pop(planted).log_evidence
+    monkeypatch.setattr(Fit, 'implausible',
+                        lambda fit: ['airflow.beta'] if 'airflow' in fit.names else [])
+    assert found._to_exchange() == ({'airflow', 'payload_error'}, ['airflow'])
+    found._exchange()
+    assert found.fits[planted].log_evidence == pytest.approx(before, abs=1.0)
+    assert found.valid()[0] == planted
 
 
 def test_an_effect_has_to_matter_by_a_practical_size(model):

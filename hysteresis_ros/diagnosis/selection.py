@@ -287,16 +287,16 @@ class Selection:
         """
         Return a set with those of its effects that others may have to take the place of.
 
-        All of the answer. Where there is none, but the most probable set of all would suffice,
-        those of it whose values are not physical: they stand for something else.
+        Those whose values are not physical, of the most probable set of all if that would suffice:
+        they stand for something else. Then all of the answer.
         """
-        best = next(iter(self.valid()), frozenset())
-        if self.sufficient(best):
-            return best, sorted(best)
-        best = next(names for names in self.ranked() if names not in self._exchanged)
-        if not self.sufficient(best):
-            return frozenset(), []
-        return best, sorted({one.split('.')[0] for one in self.fits[best].implausible()})
+        answer = next(iter(self.valid()), frozenset())
+        best = next(names for names in self.ranked()
+                    if names not in self._exchanged or names == answer)
+        implausible = {one.split('.')[0] for one in self.fits[best].implausible()}
+        if implausible and len(best) > 1 and self.sufficient(best):
+            return best, sorted(implausible)
+        return (answer, sorted(answer)) if self.sufficient(answer) else (frozenset(), [])
 
     def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
