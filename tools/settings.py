@@ -19,6 +19,7 @@ from hidden_scores import FIRST_MUSCLE, Row, score
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.laboratory.plant import MUSCLES
 from hysteresis_ros.workers import delayed, in_parallel
+import numpy as np
 
 NAMES = [field.name for field in dataclasses.fields(Settings)]
 FACTORS = (0.5, 2.0)
@@ -44,7 +45,7 @@ def variants(names: Sequence[str] = NAMES) -> dict[str, Settings]:
 def sample(count: int, first_seed: int, only: str | None = None,
            muscle: str = FIRST_MUSCLE) -> list[Case]:
     """
-    Return cases of the hidden-effect grid, evenly spread over it.
+    Return cases of the hidden-effect grid, spread over it: one at random of each stretch.
 
     Parameters
     ----------
@@ -60,7 +61,9 @@ def sample(count: int, first_seed: int, only: str | None = None,
     found = [case for case in cases(1, OTHERS, muscles=(muscle,))
              if only is None or only in (case.group, *case.effects)]
     count = min(count, len(found))
-    spread = [found[number * len(found) // count] for number in range(count)]
+    # Strengths take turns in the grid: an even distance would meet one of them alone.
+    places = np.random.default_rng(first_seed).random(count) + np.arange(count)
+    spread = [found[int(place * len(found) / count)] for place in places]
     return [case._replace(seed=case.seed - FIRST_SEED + first_seed) for case in spread]
 
 
