@@ -20,11 +20,29 @@ SLOW = ('test_bench_diagnosis', 'test_demo', 'test_diagnose', 'test_faults',
         'test_loads', 'test_page_in_browser', 'test_readme', 'test_studio_in_browser',
         'test_table1')
 
-# Nodes and boards at work. They depend on ROS, which is the same with all versions of the rest, and
-# wait for each other, so that continuous integration runs them with one set of versions.
-NODES = ('test_board', 'test_board_clocks', 'test_board_heat_and_cool', 'test_bridge_node',
-         'test_commands', 'test_compensator_node', 'test_geometry_node', 'test_lifecycle',
-         'test_node_parameters', 'test_node_running', 'test_protection', 'test_recording')
+# Nodes and boards at work, their firmware, and the package as a whole. They depend on ROS and on
+# compilers, which are the same with all versions of the rest, and wait for each other, so that
+# continuous integration runs them with one set of versions.
+NODES = ('test_architecture', 'test_board', 'test_board_clocks', 'test_board_heat_and_cool',
+         'test_bridge_node', 'test_commands', 'test_compensator_node', 'test_description',
+         'test_firmware_board', 'test_firmware_files', 'test_firmware_protocol', 'test_first_hour',
+         'test_geometry_node', 'test_lifecycle', 'test_monitor_node', 'test_node_parameters',
+         'test_node_running', 'test_packaging', 'test_protection', 'test_recording')
+
+# Ten seconds and more of a core each, with little that shorter tests do not show: marked as long.
+LONG = ('test_a_damaged_file_is_compiled_anew', 'test_other_packages_keep_their_own_cache',
+        'test_two_processes_that_compile_at_once_keep_both_results',
+        'test_without_any_folder_functions_are_compiled_all_the_same',
+        'test_pages_build_without_warnings',
+        'test_a_dask_cluster_takes_the_diagnosis_as_the_readme_says',
+        'test_noise_that_is_slow_is_not_taken_for_an_effect[1]',
+        'test_noise_that_is_slow_is_not_taken_for_an_effect[2]',
+        'test_effect_that_begins_in_mid_run_is_named',
+        'test_a_sine_as_a_trajectory_is_as_good_as_angle_by_angle',
+        'test_commands_warn_of_loads_beyond_the_bench',
+        'test_growth_of_another_form_has_the_right_name',
+        'test_the_recording_gives_the_same_answer',
+        'test_the_notebook_goes_from_the_bench_to_the_extended_model')
 
 # Tests of other runs on the same network must not be heard; rclpy reads this at its start.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
@@ -42,8 +60,10 @@ hypothesis.settings.load_profile('suite')
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what `-m "not slow"` and `-m "not nodes"` leave out."""
+    """Mark what `-m "not slow"`, `-m "not nodes"` and `-m "not long"` leave out."""
     for item in items:
+        if not {item.name, getattr(item, 'originalname', None)}.isdisjoint(LONG):
+            item.add_marker('long')
         for marker, stems in (('slow', SLOW), ('nodes', NODES)):
             if item.path.stem in stems:
                 item.add_marker(marker)

@@ -15,9 +15,8 @@ from tools.faults.table import BOARDS, committed
 
 # Where the machine code shows most that the simulated board does not; the others take minutes, and
 # the tests of the machine code inject some of them on their own.
-QUICK = ('cable pulled, put back after 0.5 s', 'encoder counts the wrong way', 'encoder jumps',
-         'encoder stands still while heated', 'index pulse missing',
-         "board's clock jumps back by a minute", 'two masters on one port')
+QUICK = ('cable pulled, put back after 0.5 s', 'encoder counts the wrong way',
+         'two masters on one port')
 
 
 def check(fault, outcome):
