@@ -13,11 +13,6 @@ from tools.faults.fault import BEGIN, LIMIT, VOLTAGE
 from tools.faults.run import run_all
 from tools.faults.table import BOARDS, committed
 
-# Where the machine code shows most that the simulated board does not; the others take minutes, and
-# the tests of the machine code inject some of them on their own.
-QUICK = ('cable pulled, put back after 0.5 s', 'encoder counts the wrong way',
-         'two masters on one port')
-
 
 def check(fault, outcome):
     """Hot before it, off in time after it, and never more than was asked for."""
@@ -83,9 +78,7 @@ def test_fault(simulated, fault):
 
 
 @without_simavr()
-@pytest.mark.parametrize('fault', [
-    pytest.param(fault, id=fault.name, marks=[] if fault.name in QUICK else [pytest.mark.long])
-    for fault in FAULTS])
+@pytest.mark.parametrize('fault', FAULTS, ids=lambda fault: fault.name)
 def test_fault_on_the_machine_code(on_machine_code, fault):
     check(fault, on_machine_code[fault.name])
 
