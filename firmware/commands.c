@@ -7,6 +7,7 @@
 #include "hal.h"
 #include "number.h"
 #include "output.h"
+#include "power.h"
 #include "telemetry.h"
 #include "writer.h"
 
@@ -22,6 +23,7 @@ static void greet(uint32_t now)
     writer_word(TEXT("reset"), hal_reset_cause());
     writer_unsigned(TEXT("watchdog"), LONGEST_WATCHDOG);
     writer_decimal(TEXT("limit"), DUTY_LIMIT_PERCENT, 2);
+    writer_decimal(TEXT("rms"), RMS_LIMIT, 3);
     writer_end();
 }
 
@@ -41,6 +43,43 @@ static bool is_positive(const struct number *number)
     return !number->negative && number->whole > 0;
 }
 
+// What `config` may leave out; `result` stays as it is then.
+static enum refusal read_rms(const struct frame *frame, uint32_t *result)
+{
+    struct text value;
+    struct number rms;
+    if (!frame_value(frame, TEXT("rms"), &value)) {
+        return OBEYED;
+    }
+    if (!number_read(value, &rms)) {
+        return NO_NUMBER;
+    }
+    if (rms.negative || (rms.whole == 0 && !rms.has_fraction)) {
+        return OUT_OF_RANGE;
+    }
+    if (rms.whole < RMS_LIMIT / 1000 + 1) {     // more is as good as none
+        *result = rms.whole * 1000 + rms.millionths / 1000;
+    }
+    return OBEYED;
+}
+
+static enum refusal read_window(const struct frame *frame, uint32_t *result)
+{
+    struct text value;
+    struct number window;
+    if (!frame_value(frame, TEXT("rms_window"), &value)) {
+        return OBEYED;
+    }
+    if (!number_read(value, &window) || window.has_point) {
+        return NO_NUMBER;
+    }
+    if (!is_positive(&window)) {
+        return OUT_OF_RANGE;
+    }
+    *result = window.whole;
+    return OBEYED;
+}
+
 static enum refusal configure(const struct frame *frame, uint32_t now)
 {
     struct number period, watchdog;
@@ -48,9 +87,16 @@ static enum refusal configure(const struct frame *frame, uint32_t now)
         || !read_integer(frame, TEXT("watchdog"), &watchdog)) {
         return NO_NUMBER;
     }
-    if (!is_positive(&period) || !is_positive(&watchdog)) {
+    uint32_t limit = RMS_LIMIT, window = RMS_WINDOW;
+    const enum refusal rms = read_rms(frame, &limit);
+    const enum refusal rms_window = read_window(frame, &window);
+    if (rms == NO_NUMBER || rms_window == NO_NUMBER) {
+        return NO_NUMBER;
+    }
+    if (!is_positive(&period) || !is_positive(&watchdog) || rms || rms_window) {
         return OUT_OF_RANGE;
     }
+    power_set_limit(limit, window);
     telemetry_set_period(period.whole, now);
     output_set_watchdog(watchdog.whole);
     return OBEYED;
@@ -78,6 +124,7 @@ static void answer(enum refusal refusal, uint16_t sequence)
         [DISABLED] = "disabled",
         [OUT_OF_RANGE] = "out_of_range",
         [NO_SUPPLY] = "supply",
+        [TOO_MUCH_POWER] = "power",
         [STOPPED] = "stop",
         [NO_NUMBER] = "field_missing_or_no_number",
         [UNKNOWN_COMMAND] = "unknown_command",

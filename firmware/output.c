@@ -4,6 +4,7 @@
 
 #include "config.h"
 #include "hal.h"
+#include "power.h"
 
 static struct output state;
 static uint32_t last_set;
@@ -31,6 +32,7 @@ void output_start(uint32_t now)
     last_set = now;
     last_closed = now;
     watchdog = LONGEST_WATCHDOG;
+    power_start(now);
     apply(0);
 }
 
@@ -61,6 +63,18 @@ static void watch_supply(void)
     }
 }
 
+// Remembered until `disable`, too: a host that asks for more than the wires stand is not to be
+// trusted with what they have left.
+static void watch_power(uint32_t now)
+{
+    power_add(state.steps, state.supply, now);
+    if (power_is_exceeded()) {
+        state.enabled = false;
+        set_fault(FAULT_POWER, true);
+        apply(0);
+    }
+}
+
 static void watch_setpoints(uint32_t now)
 {
     if (state.enabled && now - last_set > watchdog) {
@@ -71,6 +85,7 @@ static void watch_setpoints(uint32_t now)
 
 void output_watch(uint32_t now)
 {
+    watch_power(now);
     watch_stop(now);
     watch_supply();
     watch_setpoints(now);
@@ -80,6 +95,9 @@ enum refusal output_enable(uint32_t now)
 {
     if (state.faults & FAULT_STOP) {
         return STOPPED;
+    }
+    if (state.faults & FAULT_POWER) {
+        return TOO_MUCH_POWER;
     }
     if (!state.enabled) {
         apply(0);
@@ -96,6 +114,9 @@ void output_disable(void)
     set_fault(FAULT_WATCHDOG, false);
     if (!hal_stop_is_open()) {
         set_fault(FAULT_STOP, false);
+    }
+    if (!power_is_exceeded()) {
+        set_fault(FAULT_POWER, false);
     }
 }
 
@@ -115,6 +136,7 @@ enum refusal output_set(uint16_t steps, uint16_t sequence, uint32_t now)
     last_set = now;
     state.accepted = sequence;
     state.has_accepted = true;
+    state.obeyed++;
     return OBEYED;
 }
 

@@ -15,15 +15,17 @@ enum refusal {
     DISABLED,
     OUT_OF_RANGE,
     NO_SUPPLY,
+    TOO_MUCH_POWER,
     STOPPED,
     NO_NUMBER,
     UNKNOWN_COMMAND,
 };
 
 enum fault {
-    FAULT_STOP = 1,
-    FAULT_SUPPLY = 2,
-    FAULT_WATCHDOG = 4,
+    FAULT_POWER = 1,
+    FAULT_STOP = 2,
+    FAULT_SUPPLY = 4,
+    FAULT_WATCHDOG = 8,
 };
 
 struct output {
@@ -31,6 +33,7 @@ struct output {
     uint16_t supply;        // mV
     uint16_t accepted;      // sequence number of the latest set that was obeyed,
     bool has_accepted;      // if there was one
+    uint16_t obeyed;        // how many there were
     bool enabled;
     uint8_t faults;
 };

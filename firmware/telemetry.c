@@ -13,14 +13,18 @@ static uint32_t next;
 
 void telemetry_start(uint32_t now)
 {
+    period = 0;
     telemetry_set_period(FIRST_PERIOD, now);
 }
 
 void telemetry_set_period(uint32_t milliseconds, uint32_t now)
 {
+    const uint32_t before = period;
     period = milliseconds < SHORTEST_PERIOD ? SHORTEST_PERIOD
              : milliseconds > LONGEST_PERIOD ? LONGEST_PERIOD : milliseconds;
-    next = now + period;
+    if (period != before) {     // a host that says it again and again keeps nothing from coming
+        next = now + period;
+    }
 }
 
 static void write_faults(uint8_t faults, bool counts_lost)
@@ -31,7 +35,7 @@ static void write_faults(uint8_t faults, bool counts_lost)
         writer_text(TEXT("counts_lost"));
         comma = ",";
     }
-    static const FLASH char names[][9] = {"stop", "supply", "watchdog"};
+    static const FLASH char names[][9] = {"power", "stop", "supply", "watchdog"};
     for (uint8_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         if (faults >> i & 1) {
             if (*comma) {
@@ -64,6 +68,7 @@ static void send(uint32_t now)
     if (output->has_accepted) {
         writer_unsigned(TEXT("accepted"), output->accepted);
     }
+    writer_unsigned(TEXT("obeyed"), output->obeyed);
     write_faults(output->faults, position->counts_lost);
     writer_end();
 }
@@ -71,6 +76,9 @@ static void send(uint32_t now)
 void telemetry_send_if_due(uint32_t now)
 {
     if ((int32_t)(now - next) < 0) {
+        if (next - now > period) {      // the clock has jumped back
+            next = now + period;
+        }
         return;
     }
     next += period;

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the firmware does, compiled for this computer: beside the simulated board, and alone."""
 
+import math
 import re
 
 from firmware_support import build_library, FIRMWARE, HostBoard, PWM_STEPS
@@ -62,13 +63,21 @@ def test_greeting(board):
     assert int(board.ask('hello', protocol=1)[1]['boot']) == identity.boot + 1
 
 
+# Limits of the mean heating power, right and wrong; none is that of a simple duty, where rounding
+# would decide.
+POWER = st.fixed_dictionaries({}, optional={
+    'rms': st.sampled_from(['5.123', '0.51', '8.77', '100', '9999999999.5', '0', '-1', '0.0',
+                            'x']),
+    'rms_window': st.sampled_from([100, 150, 1000, 9999999999, 0, -1, '1.0', 'x'])})
+
 # What a host may send, to both boards at once; time passes between.
 COMMANDS = st.one_of(
     st.builds(lambda duty: ('set', {'duty': duty}), st.one_of(
         st.floats(-0.2, 1.2), st.sampled_from(['1.0000000001', '-0', '0', '1', 'x', '1.', '-1']))),
-    st.builds(lambda period, watchdog: ('config', {'period': period, 'watchdog': watchdog}),
+    st.builds(lambda period, watchdog, power: (
+                  'config', {'period': period, 'watchdog': watchdog, **power}),
               st.integers(1, 20).map(lambda n: n * TICK) | st.sampled_from([0, -5, '1.0', 'x']),
-              st.integers(1, WATCHDOG) | st.sampled_from([0, -1])),
+              st.integers(1, WATCHDOG) | st.sampled_from([0, -1]), POWER),
     st.sampled_from([('enable', {}), ('disable', {}), ('zero', {}), ('config', {'period': 100}),
                      ('set', {}), ('reboot', {'now': 1}), ('tele', {})]))
 ACTIONS = st.lists(st.one_of(COMMANDS, st.just(('enable', {})), st.integers(1, 40),
@@ -77,6 +86,9 @@ ACTIONS = st.lists(st.one_of(COMMANDS, st.just(('enable', {})), st.integers(1, 4
 
 @given(ACTIONS)
 @example([('enable', {}), ('set', {'duty': 0.5}), 24, 1, 1, ('set', {'duty': 0.25}), 6])
+@example([('config', {'period': 20, 'watchdog': 500, 'rms': '5.123', 'rms_window': 1000}),
+          ('enable', {}), ('set', {'duty': 0.5}), 20, ('set', {'duty': 0.5}), ('disable', {}), 1,
+          ('enable', {}), ('set', {'duty': 0.15}), 20])
 def test_it_answers_as_the_simulated_board_does(firmware_library, actions):
     """Answers, refusals, explanations and telemetry are the same, byte for byte where they can."""
     firmware, simulated = HostBoard(firmware_library), SimulatedBoard(StillArm())
@@ -409,6 +421,67 @@ def test_telemetry_that_is_late_once_keeps_its_times(board):
     board.library.host_leap(130)
     board.advance(170)
     assert [int(frame.fields['time']) for frame in board.frames()] == [131, 200, 300]
+
+
+def heat(board, seconds, duty='0.5'):
+    """Repeat a setpoint and return the time in s at which the gates went off; None if not."""
+    for tenth in range(round(10.0 * seconds)):
+        answer = board.ask('set', duty=duty)
+        if answer is not None:
+            return tenth / 10.0
+        board.advance(100)
+    return None
+
+
+def test_the_mean_power_is_limited_as_the_host_asks(board):
+    """By a lag of the square; the time is that of the equation, within two of its ticks."""
+    rms, window = 6.0, 10.0
+    assert board.ask('config', period=100, watchdog=500, rms=rms, rms_window=10000)[0] == 'ok'
+    assert board.ask('enable')[0] == 'ok'
+    share = rms ** 2 / (0.5 * 12.0 ** 2)
+    assert heat(board, 20.0) == pytest.approx(-window * math.log(1.0 - share), abs=0.2)
+    assert board.pwm == 0
+    assert board.telemetry()['faults'] == 'power'
+
+
+def test_what_the_power_limit_switched_off_stays_so_until_the_host_has_disabled(board):
+    """And what the wires have had already counts on."""
+    board.ask('config', period=100, watchdog=500, rms=6.0, rms_window=10000)
+    board.ask('enable')
+    first = heat(board, 20.0)
+    assert board.ask('enable')[1]['reason'] == 'power'
+    board.advance(2000)
+    assert board.telemetry()['faults'] == 'power'
+    assert board.ask('disable')[0] == 'ok'
+    assert board.telemetry()['faults'] == 'none'
+    assert board.ask('enable')[0] == 'ok'
+    assert 0.0 < heat(board, 20.0) < first / 2.0
+
+
+def test_the_power_limit_lets_pass_what_is_below_it(board):
+    """For ever, at 99 % of it; and without one, everything."""
+    board.ask('config', period=100, watchdog=500, rms=6.0, rms_window=1000)
+    board.ask('enable')
+    assert heat(board, 100.0, round(0.98 * 0.25, 5)) is None
+    board.ask('config', period=100, watchdog=500)
+    assert heat(board, 200.0, 1.0) is None
+
+
+def test_a_power_limit_is_kept_that_the_host_does_not_know(tmp_path):
+    """A board for a thin wire is built with one, and says so; the host may ask for less only."""
+    library = build_library(tmp_path, 'CONFIG=-DRMS_LIMIT=3000 -DRMS_WINDOW=2000')
+    for asked in ({}, {'rms': 8.0}, {'rms': 3.0}, {'rms': 3.0004}):
+        limited = HostBoard(library)
+        assert limited.ask('hello')[1]['rms'] == '3.000'
+        assert limited.ask('config', period=100, watchdog=500, **asked)[0] == 'ok'
+        limited.ask('enable')
+        assert heat(limited, 20.0, 0.07) == pytest.approx(
+            -2.0 * math.log(1.0 - 9.0 / (0.07 * 144.0)), abs=0.3)
+    assert limited.ask('config', period=100, watchdog=500, rms=2.0)[0] == 'ok'
+    limited.advance(20000)
+    limited.ask('disable')
+    limited.ask('enable')
+    assert heat(limited, 20.0, 0.035) is not None
 
 
 def test_a_duty_limit_is_kept(tmp_path):

@@ -114,7 +114,7 @@ def test_every_fault_and_refusal_is_documented(root):
     names = re.search(r'names\[\]\[\d+\] = \{(.+?)\}', telemetry).group(1)
     faults = re.findall(r'"(\w+)"', names) + ['counts_lost']
     reasons = re.findall(r'= "(\w+)",', (FIRMWARE / 'commands.c').read_text('ascii'))
-    assert len(faults) == 4 and len(reasons) == 6
+    assert len(faults) == 5 and len(reasons) == 7
     for name in faults + reasons:
         assert f'`{name}`' in page, name
     assert set(faults) <= FAULTS.keys()

@@ -27,8 +27,9 @@ class Simulated:
 
     def __init__(self):
         self.board = SimulatedBoard(StillArm())
-        self.board.troubled = lambda trouble: trouble == 'supply_off' and self.off
-        self.off = False
+        self.board.troubled = lambda trouble: (trouble == 'supply_off' and self.off
+                                               or trouble == 'stop' and self.pressed)
+        self.off = self.pressed = False
         self.start()
 
     def start(self):
@@ -54,7 +55,7 @@ class Firmware:
 
     def __init__(self, library):
         self.board = HostBoard(library)
-        self.off = False
+        self.off = self.pressed = False
         self.start()
 
     def start(self):
@@ -68,6 +69,7 @@ class Firmware:
 
     def advance(self, milliseconds):
         self.board.library.host_set_supply(0 if self.off else 12000)
+        self.board.library.host_open_stop(self.pressed)
         self.board.advance(milliseconds)
         return [frame for frame in frames(self.board.transmit()) if frame.kind == 'tele']
 
@@ -119,7 +121,7 @@ class Link(RuleBasedStateMachine):
         self.watchdog = 490
         self.enabled = False
         self.duty = 0.0
-        self.bitten = False
+        self.bitten = self.stopped = False
         self.weak = self.boards[0].off
         self.say('config', 'ok', period=100, watchdog=490)
         self.pass_time(40)
@@ -138,6 +140,8 @@ class Link(RuleBasedStateMachine):
         """Let time pass, and compare the telemetry that came at its end."""
         self.time += milliseconds
         self.weak = self.boards[0].off
+        if self.boards[0].pressed:
+            self.stopped, self.enabled, self.duty = True, False, 0.0
         late = self.enabled and self.time - self.fed > self.watchdog
         self.bitten = self.bitten or late
         if self.weak or late:
@@ -148,6 +152,7 @@ class Link(RuleBasedStateMachine):
                 fields = telemetry[-1].fields
                 assert fields['on'] == str(int(self.enabled))
                 assert ('supply' in fields['faults']) == self.weak
+                assert ('stop' in fields['faults']) == self.stopped
                 if self.time - self.fed > self.watchdog + 240 or not self.bitten:
                     assert ('watchdog' in fields['faults']) == self.bitten
 
@@ -163,6 +168,9 @@ class Link(RuleBasedStateMachine):
 
     @rule()
     def enable(self):
+        if self.stopped:
+            self.say('enable', 'no', 'stop')
+            return
         if not self.enabled:
             self.fed = self.time
         self.enabled = True
@@ -171,6 +179,7 @@ class Link(RuleBasedStateMachine):
     @rule()
     def disable(self):
         self.enabled, self.duty, self.bitten = False, 0.0, False
+        self.stopped = self.boards[0].pressed
         self.say('disable', 'ok')
 
     @rule(duty=st.floats(0.0, 1.0))
@@ -208,6 +217,12 @@ class Link(RuleBasedStateMachine):
     def switch_supply(self, off):
         for board in self.boards:
             board.off = off
+        self.pass_time(2 * TICK)
+
+    @rule(pressed=st.booleans())
+    def press_stop(self, pressed):
+        for board in self.boards:
+            board.pressed = pressed
         self.pass_time(2 * TICK)
 
     @invariant()

@@ -216,7 +216,7 @@ def test_missing_fields():
                     max_size=4, unique=True).map(tuple),
     index=st.integers(0, 65535), latch=st.none() | st.integers(-2 ** 31, 2 ** 31 - 1),
     ambient=st.none() | st.integers(-4000, 9000).map(lambda c: c / 100),
-    accepted=st.none() | st.integers(0, 65535)))
+    accepted=st.none() | st.integers(0, 65535), obeyed=st.none() | st.integers(0, 65535)))
 @settings(max_examples=200)
 def test_telemetry_round_trip(telemetry):
     frame, = decode(encode('tele', 65535, telemetry.fields()))

@@ -41,7 +41,8 @@ def test_the_simulated_board_answers_as_the_example_says(page):
 
 
 def test_every_key_and_fault_is_explained(page):
-    telemetry = Telemetry(0, 0, 0.0, 0.0, False, latch=0, ambient=0.0, accepted=0)
+    telemetry = Telemetry(0, 0, 0.0, 0.0, False, latch=0, ambient=0.0, accepted=0,
+                          obeyed=0)
     for key in [*telemetry.fields(), *Identity(1, 'a', 'b', 0, 0, 32, 1.0).fields(), *FAULTS]:
         assert f'`{key}`' in page or f'{key}=' in page, key
     assert f'version {VERSION}' in page and f'At most {MAX_LINE} bytes' in page

@@ -4,6 +4,8 @@
 
 import time
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from hysteresis_ros.errors import BoardError
 from hysteresis_ros.nodes.qos import MEASUREMENTS
 from hysteresis_ros.nodes.session import Session
 import pytest
@@ -20,7 +22,7 @@ class List:
         self.written = []
 
     def write(self, name, stamp, message):
-        self.written.append((name, message.data))
+        self.written.append((name, getattr(message, 'data', None)))
 
 
 @pytest.fixture
@@ -45,3 +47,28 @@ def test_what_comes_while_the_recorder_is_held_up_is_recorded(session):
     while len(bag.written) < PUBLISHED and time.monotonic() < end:
         rclpy.spin_once(node, timeout_sec=0.05)
     assert bag.written == [('applied_voltage', float(number)) for number in range(PUBLISHED)]
+
+
+class AliveProcesses:
+    """Nodes that never end."""
+
+    def check(self):
+        pass
+
+
+def test_a_muscle_that_is_switched_off_for_good_ends_the_session(session):
+    """Else targets are published to a cold arm until the end, and compared."""
+    node, _ = session
+    publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    while not publisher.get_subscription_count():
+        rclpy.spin_once(node, timeout_sec=0.05)
+
+    def say(fault):
+        publisher.publish(DiagnosticArray(status=[DiagnosticStatus(
+            name='hardware_bridge: board', values=[KeyValue(key='fault', value=fault)])]))
+
+    say('none')
+    assert list(node.drive([0.5], 0.2, AliveProcesses(), lambda: None)) == [None]
+    say('the board was lost')
+    with pytest.raises(BoardError, match='switched the muscle off: the board was lost'):
+        node.drive([0.5], 5.0, AliveProcesses(), lambda: None)

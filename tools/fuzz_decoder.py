@@ -27,9 +27,10 @@ LONGEST_PIECE = 32      # bytes that one change inserts or erases
 MOST_CHANGES = 8        # of one input
 LOOK = 256              # inputs between two looks at the clock
 WORDS = (b'hello ', b'board ', b'tele ', b'ok ', b'no ', b' time=', b' counts=', b' index=',
-         b' latch=', b' supply=', b' duty=', b' on=1', b' accepted=', b' faults=none', b' ambient=',
-         b' protocol=', b' name=', b' boot=', b' bits=', b' speed=', b' re=', b' reason=', b'*',
-         b'\n', b'\r\n', b'#', b'65535', b'65536', b'-', b'.', b'9999999999', b'1e5', b'nan')
+         b' latch=', b' supply=', b' duty=', b' on=1', b' accepted=', b' obeyed=',
+         b' faults=none', b' ambient=', b' protocol=', b' name=', b' boot=', b' bits=',
+         b' speed=', b' re=', b' reason=', b'*', b'\n', b'\r\n', b'#', b'65535', b'65536', b'-',
+         b'.', b'9999999999', b'1e5', b'nan')
 
 
 class Mutator:
@@ -83,7 +84,8 @@ def seeds() -> list[bytes]:
     """Return frames as a board sends them, and what is none."""
     from hysteresis_ros.bridge.protocol import encode
     telemetry = {'time': 100, 'counts': -3214, 'index': 0, 'latch': -2731, 'supply': 12.009,
-                 'duty': 0.2345, 'on': 1, 'accepted': 4, 'faults': 'none', 'ambient': 22.0}
+                 'duty': 0.2345, 'on': 1, 'accepted': 4, 'obeyed': 1, 'faults': 'none',
+                 'ambient': 22.0}
     greeting = {'protocol': 1, 'name': 'simulated', 'firmware': '1', 'boot': 1, 'time': 0,
                 'bits': 32, 'speed': 1.0}
     return [encode('tele', 3, telemetry), encode('board', 0, greeting), encode('ok', 1, {'re': 2}),

@@ -28,8 +28,10 @@ from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
 from hysteresis_ros.bridge.board_state import Sample, Status
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.messages import (
-    DISABLE, ENABLE, FAULTS, Identity, NO, SET, Telemetry, TELEMETRY)
-from hysteresis_ros.bridge.protection import Protection
+    CONFIG, DISABLE, ENABLE, FAULTS, Identity, LATCHED, NO, OK, SET, Telemetry, TELEMETRY)
+from hysteresis_ros.bridge.other_master import OtherMaster
+from hysteresis_ros.bridge.protection import Limits, Protection
+from hysteresis_ros.bridge.protocol import write_number
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError, RangeError
 
@@ -40,9 +42,7 @@ SUPPLY_SAMPLES = 50         # measurements of the supply over which is averaged,
 SUPPLY_JUMP = 0.03          # relative change that is taken at once
 STOP_PATIENCE = 0.5         # s to wait on the way out until the board says that it is off
 RAMP_DT = 0.02              # s of the wall between two setpoints of a soft start
-SAME_DUTY = 0.004           # a step of a board with 255 of them
-FOREIGN_SAMPLES = 2.0       # samples with a duty that nobody here asked for
-FOREIGN_DECAY = 0.25        # of one of them that a good sample makes up for
+RMS_MARGIN = 1.1            # of the board's limit over ours, which counts by its samples alone
 
 
 class Board:
@@ -133,10 +133,13 @@ class Board:
         self._received = 0.0        # wall time of the latest sample
         self._limit = ''
         self._ramping = False       # a soft start is on its way up
-        # (wall time, duty) of what was sent of late, and how many samples showed another duty.
-        self._duties: collections.deque[tuple[float, float]] = collections.deque()
-        self._foreign = 0.0
+        self._other_master = OtherMaster()
         self._refusal = ''
+        self._config: Fields = {}       # for the board, from these:
+        self._config_from: tuple[Limits, Pwm] | None = None
+        self._config_asked: str | None = None   # sequence number with which it was sent last;
+        self._config_open = False               # nobody has answered
+        self._answered: collections.deque[str] = collections.deque(maxlen=20)
         self._connections = 0
         self._threads = [threading.Thread(target=target, name=name, daemon=True)
                          for target, name in ((self._run, 'board reader'),
@@ -247,8 +250,7 @@ class Board:
         with self._wake:
             self._encoder.clear_fault()
             self.protection.clear()
-            self._duties.clear()
-            self._foreign = 0.0
+            self._other_master.clear()
             self._fault = ''
 
     @property
@@ -327,7 +329,7 @@ class Board:
             delay = min(2.0 * delay, self._timeouts.last_retry)
 
     def _greet(self) -> None:
-        identity = self._link.greet(self._period, self._timeouts.watchdog, self._stopping)
+        identity = self._link.greet(self._config_for, self._stopping)
         with self._wake:
             if self._identity is None:
                 self._encoder.counter_bits = identity.counter_bits
@@ -337,6 +339,8 @@ class Board:
                 self._clock.begin(
                     identity.time, (time.monotonic() - self._received) * identity.speed)
             self._identity = identity
+            self._config_from = self.protection.limits, self.pwm
+            self._config_open = False
             self._received = time.monotonic()
             self._write_problem = None
             self._supply = None
@@ -349,6 +353,8 @@ class Board:
             for frame in self._link.read():
                 if frame.kind == NO:
                     self._refusal = frame.fields.get('reason', 'no reason')
+                if frame.kind in (OK, NO):
+                    self._answered.append(frame.fields.get('re', ''))
                 if frame.kind != TELEMETRY:
                     continue
                 telemetry = Telemetry.from_frame(frame)
@@ -380,27 +386,13 @@ class Board:
             self._problem = ''
             self._sample = sample
             self._received = time.monotonic()
-            fault = self.protection.observe(sample) or self._foreign_duty(telemetry.duty)
+            # For so long may a setpoint be on its way.
+            longest = max(self._timeouts.telemetry, 3.0 * self._period) * self.slowness
+            fault = (_latched(sample) or self.protection.observe(sample)
+                     or self._other_master.observe(telemetry, time.monotonic() - longest))
             if fault:
                 self._trip(fault)
         self._on_sample(sample)
-
-    def _foreign_duty(self, duty: float) -> str:
-        """Return what is wrong if the board applies a duty for which nobody here asked."""
-        # For so long may one be on its way.
-        longest = max(self._timeouts.telemetry, 3.0 * self._period)
-        oldest = time.monotonic() - longest * self.slowness
-        # One stands until the next was sent, however long that took.
-        while len(self._duties) > 1 and self._duties[1][0] < oldest:
-            self._duties.popleft()
-        if duty <= SAME_DUTY or any(abs(duty - one) <= SAME_DUTY for _, one in self._duties):
-            self._foreign = max(self._foreign - FOREIGN_DECAY, 0.0)
-            return ''
-        self._foreign += 1.0
-        if self._foreign < FOREIGN_SAMPLES:
-            return ''
-        return (f'the board applies a duty of {duty:.3f}, for which this program did not ask: '
-                'another one talks to it, or the line delays its words; end the other one')
 
     def _trip(self, fault: str) -> None:
         """Switch the output off until `clear_fault` and `enable`."""
@@ -429,8 +421,7 @@ class Board:
             self._problem = problem
             self._target = None
             self._limit = ''
-            self._duties.clear()
-            self._foreign = 0.0
+            self._other_master.clear()
         self._say_zero()
 
     # The writing thread
@@ -443,23 +434,54 @@ class Board:
                 self._news = False
                 if self._stopping.is_set():
                     return
-                command = self._command() if self._online else None
-            if command is None:
-                continue
+                commands = self._commands() if self._online else []
             try:
-                self._link.send(*command)
+                for kind, fields in commands:
+                    sequence = self._link.send(kind, fields)
+                    if kind == CONFIG:
+                        self._config_asked = str(sequence)
+                    elif kind == SET:
+                        self._note_sent(sequence)
             except (BoardError, ProtocolError) as error:
                 self._write_problem = error
 
-    def _command(self) -> tuple[str, Fields | None] | None:
-        """Return what the board has to hear now: (kind, fields), or None."""
+    def _commands(self) -> list[tuple[str, Fields | None]]:
+        """Return what the board has to hear now: (kind, fields) each."""
+        commands: list[tuple[str, Fields | None]] = []
+        if self._config_is_due():
+            commands.append((CONFIG, self._config))
         if self._sample is None or self._wanted != self._sample.enabled:
-            return (ENABLE if self._wanted else DISABLE, None)
-        if not self._wanted:
-            return None
-        duty = self._duty()
-        self._duties.append((time.monotonic(), duty))
-        return (SET, {'duty': duty})
+            commands.append((ENABLE if self._wanted else DISABLE, None))
+        elif self._wanted:
+            duty = self._duty()
+            self._other_master.ask(time.monotonic(), duty)
+            commands.append((SET, {'duty': duty}))
+        elif _latched(self._sample):
+            commands.append((DISABLE, None))    # that its reason may be gone is for it to see
+        return commands
+
+    def _config_is_due(self) -> bool:
+        """Whether the limits have changed, and the board has not answered since."""
+        made_from = self.protection.limits, self.pwm
+        if made_from != self._config_from and self._identity is not None:
+            self._config_from = made_from
+            self._config = self._config_for(self._identity)
+            self._config_asked, self._config_open = None, True
+        if self._config_asked in self._answered:
+            self._config_open = False
+        return self._config_open
+
+    def _config_for(self, identity: Identity) -> Fields:
+        """Return the periods and limits that a board is told."""
+        fields: dict[str, str | int | float] = {
+            'period': round(1000.0 * self._period),
+            'watchdog': round(1000.0 * self._timeouts.watchdog * max(identity.speed, 1.0))}
+        limits = self.protection.limits
+        if limits.rms_voltage:
+            highest_supply = (1.0 + self._supply_tolerance) * self._nominal_supply
+            rms = RMS_MARGIN * self.pwm.rms(limits.rms_voltage, highest_supply)
+            fields.update(rms=write_number(rms, 3), rms_window=round(1000.0 * limits.rms_window))
+        return fields
 
     def _duty(self) -> float:
         self._limit = ''
@@ -489,7 +511,16 @@ class Board:
     def _say_zero(self) -> None:
         """Tell the board to stop, as far as it can still hear."""
         try:
-            self._link.send(SET, {'duty': 0.0})
+            self._note_sent(self._link.send(SET, {'duty': 0.0}))
             self._link.send(DISABLE)
         except BoardError:
             pass    # the board's own watchdog does it
+
+    def _note_sent(self, sequence: int) -> None:
+        with self._wake:
+            self._other_master.sent(sequence)
+
+
+def _latched(sample: Sample) -> str:
+    """Return why the board has disabled itself, or ''."""
+    return '; '.join(FAULTS[name] for name in sample.faults if name in LATCHED)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A port with the protocol on it: open, greet, send, read. No threads, no retries of its own."""
 
+from collections.abc import Callable
 import dataclasses
 import errno
 import importlib
@@ -168,16 +169,14 @@ class BoardLink:
         except OSError:
             pass    # a device that is gone cannot be closed any better
 
-    def greet(self, period: float, watchdog: float, stopping: threading.Event) -> Identity:
+    def greet(self, config: Callable[[Identity], Fields], stopping: threading.Event) -> Identity:
         """
-        Find out who is there and tell the board its periods.
+        Find out who is there and tell the board its periods and limits.
 
         Parameters
         ----------
-        period : float
-            Time in s of the board's clock between two frames of telemetry.
-        watchdog : float
-            Timeout in s of the board's own watchdog, by the slower clock.
+        config : callable
+            Gives the fields of ``config`` for a board.
         stopping : threading.Event
             Ends the greeting early.
 
@@ -197,9 +196,7 @@ class BoardLink:
         if identity.protocol != VERSION:
             raise BoardError(f'port {self.port}: the board speaks version {identity.protocol} of '
                              f'the protocol, this host version {VERSION}: update one of them')
-        self._ask(CONFIG, {'period': round(1000.0 * period),
-                           'watchdog': round(1000.0 * watchdog * max(identity.speed, 1.0))},
-                  stopping)
+        self._ask(CONFIG, config(identity), stopping)
         return identity
 
     def send(self, kind: str, fields: Fields | None = None) -> int:

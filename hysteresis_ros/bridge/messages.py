@@ -33,11 +33,14 @@ FAULTS = {
     'supply': 'the supply voltage is too low, the output is off',
     'current': 'the current is too high, the output is off',
     'encoder': 'the encoder is not connected',
-    'stop': 'the emergency stop was pressed, the output is off until it is released and the board '
-            'disabled and enabled again',
+    'stop': 'the emergency stop was pressed, the board has switched off',
+    'power': 'the RMS of the voltage was above what the board allows, it has switched off',
     'counts_lost': 'the encoder turned faster than the board can count, the angle may be off; '
                    'check it and set the counter to zero',
 }
+
+# With these the board is disabled, and stays so until `disable` has come and their reason is gone.
+LATCHED = ('stop', 'power')
 
 
 class Identity(NamedTuple):
@@ -139,7 +142,9 @@ class Telemetry(NamedTuple):
     ambient : float or None
         Ambient temperature in degC, in the frames in which it is sent.
     accepted : int or None
-        Sequence number of the latest setpoint that it took.
+        Sequence number of the latest setpoint that it obeyed.
+    obeyed : int or None
+        How many setpoints it has obeyed since it started, modulo 65536.
 
     """
 
@@ -153,6 +158,7 @@ class Telemetry(NamedTuple):
     latch: 'int | None' = None
     ambient: 'float | None' = None
     accepted: 'int | None' = None
+    obeyed: 'int | None' = None
 
     def fields(self) -> dict[str, str | int | float]:
         """
@@ -170,6 +176,8 @@ class Telemetry(NamedTuple):
         fields.update(supply=write_number(self.supply, 3), duty=self.duty, on=self.enabled)
         if self.accepted is not None:
             fields['accepted'] = self.accepted
+        if self.obeyed is not None:
+            fields['obeyed'] = self.obeyed
         fields['faults'] = ','.join(self.faults) or NO_FAULTS
         if self.ambient is not None:
             fields['ambient'] = write_number(self.ambient, 2)
@@ -208,4 +216,5 @@ class Telemetry(NamedTuple):
             index=integer(frame, 'index', 0),
             latch=integer(frame, 'latch') if has('latch') else None,
             ambient=decimal(frame, 'ambient') if has('ambient') else None,
-            accepted=integer(frame, 'accepted') if has('accepted') else None)
+            accepted=integer(frame, 'accepted') if has('accepted') else None,
+            obeyed=integer(frame, 'obeyed') if has('obeyed') else None)

@@ -137,6 +137,25 @@ class Pwm:
                      f'{voltage:g} V asked, but a supply of {supply:.3g} V with duty '
                      f'{self.maximum_duty:g} gives {reachable:.3g} V')
 
+    def rms(self, voltage: float, supply: float) -> float:
+        """
+        Find the RMS over the wires of pulses that stand for a voltage.
+
+        Parameters
+        ----------
+        voltage : float
+            Voltage in V; or the RMS of one that changes, and then this is the largest possible.
+        supply : float
+            Supply voltage in V.
+
+        Returns
+        -------
+        float
+            RMS in V.
+
+        """
+        return voltage if self.law == 'rms' else math.sqrt(voltage * supply)
+
     def voltage(self, duty: float, supply: float) -> float:
         """
         Find the voltage that a duty stands for.

@@ -216,8 +216,10 @@ class BridgeNode(ManagedNode):
             response.success = True
             response.message = 'disabled; the board is not there, and will stay off'
             return response
-        response.success = await self._until(
-            lambda status: enabled(status) == wanted, ENABLE_PATIENCE * board.slowness)
+        await self._until(
+            lambda status: enabled(status) == wanted or (wanted and bool(status.fault)),
+            ENABLE_PATIENCE * board.slowness)
+        response.success = enabled(board.status) == wanted
         response.message = 'enabled' if wanted else 'disabled'
         if not response.success:
             status = board.status
@@ -411,6 +413,7 @@ class BridgeNode(ManagedNode):
             'connections': status.connections, 'frames': status.frames,
             'bad lines': status.bad_lines, 'lost frames': status.lost_frames,
             'latest refusal of the board': status.refusal or 'none',
+            'fault': status.fault or 'none',
             'setpoints taken': self._taken, 'setpoints refused': self._refused,
             'measurements published': self._published})
         sample = status.sample

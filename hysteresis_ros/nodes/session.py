@@ -27,6 +27,7 @@ from std_srvs.srv import Trigger
 from diagnostic_msgs.msg import DiagnosticArray
 
 from hysteresis_ros.errors import BoardError, ParameterError
+from hysteresis_ros.measurements.bag import BRIDGE
 from hysteresis_ros.nodes.qos import COMMANDS, RECORDED
 
 TOPICS = {
@@ -160,6 +161,7 @@ class Session(Node):
         self._bag = bag
         self._last_angle: float | None = None
         self._heard = time.monotonic()
+        self._fault = ''
         self._publisher = self.create_publisher(Float64, 'target_angle', COMMANDS)
         for name, (_, kind, qos) in TOPICS.items():
             self.create_subscription(
@@ -171,9 +173,17 @@ class Session(Node):
         if name == 'joint_states':
             self._heard = time.monotonic()
             self._last_angle = message.position[0] if message.position else None
+        elif name == '/diagnostics':
+            self._note_fault(message)
         stamp = self.get_clock().now().nanoseconds
         if stamp > 0:
             self._bag.write(name, stamp, message)
+
+    def _note_fault(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if BRIDGE in status.name:
+                fault = next((pair.value for pair in status.values if pair.key == 'fault'), 'none')
+                self._fault = '' if fault == 'none' else fault
 
     def now(self) -> float:
         """Time of the node's clock [s]."""
@@ -227,6 +237,11 @@ class Session(Node):
         -------
         ndarray, shape (n,)
             Measured angles [rad].
+
+        Raises
+        ------
+        BoardError
+            If a node ends or falls silent, or the bridge has switched the muscle off for good.
         """
         reached = []
         for target in targets:
@@ -236,6 +251,8 @@ class Session(Node):
             while self.now() < end:
                 rclpy.spin_once(self, timeout_sec=0.05)
                 processes.check()
+                if self._fault:
+                    raise BoardError(f'the bridge has switched the muscle off: {self._fault}')
                 if time.monotonic() - self._heard > STALL_PATIENCE:
                     raise BoardError(f'no joint_states for {STALL_PATIENCE:.0f} s')
             reached.append(self._last_angle)
@@ -269,7 +286,7 @@ def record(folder: AnyPath, sequences: Sequence[np.ndarray], parameters: dict, h
     Raises
     ------
     BoardError
-        If a node ends or falls silent.
+        If a node ends or falls silent, or the bridge has switched the muscle off for good.
     ParameterError
         If the bag cannot be made.
     """

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import contextlib
+import dataclasses
 import math
 import time
 
@@ -22,6 +23,14 @@ def another_master(run: Run) -> None:
         for number in range(int(AFTER / 0.05)):
             run.rig.write(encode('set', 40000 + number, {'duty': 0.9}))
             time.sleep(0.05)
+
+
+def limits_that_fail(run: Run) -> None:
+    """Let the host's own limits pass everything, soon after the RMS was limited to 3 V."""
+    run.wait(BEGIN)
+    protection = run.board.protection
+    protection.limits = dataclasses.replace(protection.limits, rms_voltage=3.0, rms_window=1.0)
+    protection.limit = lambda voltage, *_: (voltage, '', False)     # type: ignore[method-assign]
 
 
 def then(voltage: float) -> Callable[[float], float]:
@@ -74,6 +83,10 @@ FAULTS = (
           then(6.5)),
     Fault('two masters on one port', 'another program writes `set duty=0.9`',
           'another one talks to it', meddle=another_master),
+    Fault('emergency stop pressed', '`stop_after`', 'emergency stop was pressed',
+          f'stop_after={BEGIN}'),
+    Fault('host heats beyond its limit of the RMS', 'its own protection fails',
+          'above what the board allows', meddle=limits_that_fail),
     Fault("board's clock jumps back by a minute", '`clock_back`', 'has started anew',
           f'clock_back={BEGIN}'),
 )

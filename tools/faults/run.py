@@ -77,6 +77,8 @@ class Run:
 
     Attributes
     ----------
+    board : Board
+        The host's side.
     rig : SimulatedPort or Chip
         The board with arm and cable.
     """
@@ -86,8 +88,8 @@ class Run:
         self._trace: Trace = []
         self._said: dict[str, float] = {}
         self._next = 0.0        # when a setpoint is due
-        self._board = Board(url_of(scheme, fault.query), encoder=Encoder(index='check'))
-        made = self._board._link._serial
+        self.board = Board(url_of(scheme, fault.query), encoder=Encoder(index='check'))
+        made = self.board._link._serial
         self.rig: LatePort | Chip
         if scheme == 'sim':
             made.simulation = self.rig = LatePort(made.port)
@@ -107,7 +109,7 @@ class Run:
 
     def run(self) -> Outcome:
         """Do it, and return what came of it."""
-        with self._board as board:
+        with self.board as board:
             board.enable(True)
             if self._fault.meddle is not None:
                 threading.Thread(target=self._fault.meddle, args=(self,), daemon=True).start()

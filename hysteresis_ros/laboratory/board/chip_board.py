@@ -71,7 +71,7 @@ class ChipBoard:
         share = BROWNOUT_SUPPLY if self._begun(self._brownout, BROWNOUT_TIME) else 1.0
         for trouble, its_share in SUPPLY_TROUBLES.items():
             share *= its_share if self.troubled(trouble) else 1.0
-        return SUPPLY * share
+        return SUPPLY * share * self.arm.conditions.supply.share(self.arm.time)
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the host."""
@@ -108,6 +108,7 @@ class ChipBoard:
             if any(self._begun(self._brownout + after, TICK) for after in (0, BROWNOUT_TIME)):
                 self.start()        # the chip's own brown-out detector, and the power that is back
         self._say('supply', f'{1000.0 * self.supply:.0f}')
+        self._say('stop', str(int(self.troubled('stop'))))
         self._say('index', 'off' if self.troubled('index_missing')
                   else str(INDEX_COUNTS - self._start))
 

@@ -60,10 +60,12 @@ class SimulatedPort:
 
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         simulation = parse_url(url)
-        board = SimulatedBoard(make_plant(simulation).arm, supply=simulation.supply,
+        arm = make_plant(simulation).arm
+        board = SimulatedBoard(arm, supply=simulation.supply,
                                seed=simulation.seed, speed=simulation.speed,
                                brownout=simulation.brownout, clock_back=simulation.clock_back,
-                               encoder_jump=simulation.encoder_jump)
+                               encoder_jump=simulation.encoder_jump,
+                               battery=lambda: arm.conditions.supply.share(arm.time))
         self.cable = Cable(board, simulation)
         self.is_open = False
         self._clock = clock

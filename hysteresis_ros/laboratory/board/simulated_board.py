@@ -24,6 +24,7 @@ from hysteresis_ros.bridge.protocol import (
 from hysteresis_ros.errors import ProtocolError
 from hysteresis_ros.laboratory.board.encoder_troubles import (
     COUNTS_PER_REVOLUTION, EncoderTroubles, INDEX_COUNTS)
+from hysteresis_ros.laboratory.board.power import PowerLimit, WINDOW
 
 if TYPE_CHECKING:
     from hysteresis_ros.laboratory.arm import Arm
@@ -66,6 +67,8 @@ class SimulatedBoard:
         Time in s at which the board's clock jumps back by `CLOCK_JUMP`.
     encoder_jump : float, optional
         Time in s at which the encoder jumps by two turns and a half.
+    battery : callable
+        Returns the share of the supply voltage that there is now.
 
     Attributes
     ----------
@@ -84,12 +87,13 @@ class SimulatedBoard:
 
     def __init__(self, arm: Arm, supply: float = 12.0, seed: int = 0, speed: float = 1.0,
                  brownout: float = math.inf, clock_back: float = math.inf,
-                 encoder_jump: float = math.inf) -> None:
+                 encoder_jump: float = math.inf, battery: Callable[[], float] = lambda: 1.0
+                 ) -> None:
         self.arm = arm
         self.troubled: Callable[[str], bool] = lambda name: False
         self._clock_back = 1000.0 * clock_back
         self._encoder = EncoderTroubles(encoder_jump)
-        self._nominal_supply = supply
+        self._nominal_supply, self._battery = supply, battery
         self._random = random.Random(seed)
         self._speed = speed
         self._brownout = 1000.0 * brownout
@@ -107,6 +111,7 @@ class SimulatedBoard:
         self.duty = 0.0
         self.enabled = False
         self.faults: set[str] = set()
+        self._power = PowerLimit()
         self._decoder = Decoder()
         self._sequence = 0
         self._period = PERIOD
@@ -116,6 +121,7 @@ class SimulatedBoard:
         self._next_remark = 0
         self._last_set = 0
         self._accepted: int | None = None
+        self._obeyed = 0
         self._counter_zero = self._last_counts = self._encoder_counts()
         if self._boot == 1:
             self._counter_zero = 0      # the encoder was set to zero when the arm was built
@@ -132,7 +138,7 @@ class SimulatedBoard:
         share = BROWNOUT_SUPPLY if low else 1.0
         for trouble, its_share in SUPPLY_TROUBLES.items():
             share *= its_share if self.troubled(trouble) else 1.0
-        return self._nominal_supply * share
+        return self._nominal_supply * self._battery() * share
 
     def receive(self, data: bytes) -> None:
         """
@@ -175,6 +181,7 @@ class SimulatedBoard:
 
         """
         for _ in range(ticks):
+            self._look_at_stop()
             self._look_at_supply()
             duty = 1.0 if self.troubled('mosfet_stuck') else self.duty
             self.arm.advance(TICK / 1000.0, self.supply * math.sqrt(duty))
@@ -183,6 +190,7 @@ class SimulatedBoard:
             if 0.0 <= self._world_time - self._clock_back < TICK:
                 self._jump_back()
             self._count()
+            self._look_at_power()
             if 0.0 <= self._world_time - self._brownout - BROWNOUT_TIME < TICK:
                 self.start()
             if self.time - self._last_set > self._watchdog and self.enabled:
@@ -219,6 +227,21 @@ class SimulatedBoard:
         return self._encoder.counts(self.arm.encoder_counts, self._world_time / 1000.0,
                                     self.troubled)
 
+    def _look_at_stop(self) -> None:
+        if self.troubled('stop'):
+            self._shut_down('stop')
+
+    def _look_at_power(self) -> None:
+        self._power.add(self.duty, self.supply, TICK)
+        if self._power.exceeded:
+            self._shut_down('power')
+
+    def _shut_down(self, fault: str) -> None:
+        """Switch off; nothing is enabled before somebody disables, and the reason is gone."""
+        self.duty = 0.0
+        self.enabled = False
+        self.faults.add(fault)
+
     def _look_at_supply(self) -> None:
         if self.supply < LOWEST_SUPPLY:
             self.duty = 0.0
@@ -249,7 +272,8 @@ class SimulatedBoard:
             time=self.time % TIME_LIMIT, counts=self._encoder_counts() - self._counter_zero,
             supply=max(self.supply + self._random.gauss(0.0, SUPPLY_NOISE), 0.0), duty=self.duty,
             enabled=self.enabled, faults=tuple(sorted(self.faults)), index=self._index,
-            latch=self._latch, ambient=ambient, accepted=self._accepted).fields()
+            latch=self._latch, ambient=ambient, accepted=self._accepted,
+            obeyed=self._obeyed).fields()
         self._send(TELEMETRY, self._last_telemetry)
 
     def _send(self, kind: str, fields: Fields) -> None:
@@ -284,23 +308,35 @@ class SimulatedBoard:
 
     def _on_config(self, frame: Frame) -> str | None:
         period, watchdog = integer(frame, 'period'), integer(frame, 'watchdog')
-        if period < 1 or watchdog < 1:
+        rms = decimal(frame, 'rms', math.inf)
+        window = integer(frame, 'rms_window', WINDOW)
+        if period < 1 or watchdog < 1 or rms <= 0.0 or window < 1:
             return 'out_of_range'
-        self._period = -(-period // TICK) * TICK
+        self._power.set(rms, window)
+        before, self._period = self._period, -(-period // TICK) * TICK
         self._watchdog = watchdog
-        self.next_telemetry = self.time + self._period
+        if self._period != before:      # a host that says it again keeps nothing from coming
+            self.next_telemetry = self.time + self._period
         return None
 
-    def _on_enable(self, frame: Frame) -> None:
+    def _on_enable(self, frame: Frame) -> str | None:
+        for fault in ('stop', 'power'):
+            if fault in self.faults:
+                return fault
         if not self.enabled:
             self.duty = 0.0
             self.enabled = True
             self._last_set = self.time
+        return None
 
     def _on_disable(self, frame: Frame) -> None:
         self.duty = 0.0
         self.enabled = False
         self.faults.discard('watchdog')
+        if not self.troubled('stop'):
+            self.faults.discard('stop')
+        if not self._power.exceeded:
+            self.faults.discard('power')
 
     def _on_zero(self, frame: Frame) -> None:
         self._counter_zero = self._encoder_counts()
@@ -319,4 +355,5 @@ class SimulatedBoard:
         self.faults.discard('watchdog')
         self._last_set = self.time
         self._accepted = frame.sequence
+        self._obeyed = (self._obeyed + 1) % SEQUENCE_LIMIT
         return None

@@ -44,6 +44,7 @@ index_missing     its index pulse does not come
 supply_low        the supply has 0.6 of its voltage
 supply_off        the supply has none
 supply_double     the supply has twice its voltage
+stop              the emergency stop is pressed
 mosfet_stuck      a MOSFET conducts all the time, whatever its gate gets
 ================= =================================================================================
 
@@ -66,7 +67,7 @@ ARM = 'bicep'
 
 TROUBLES = ('unplug', 'silent', 'deaf', 'late', 'mad', 'frozen', 'encoder_still',
             'encoder_reversed', 'index_missing', 'supply_low', 'supply_off', 'supply_double',
-            'mosfet_stuck')
+            'stop', 'mosfet_stuck')
 
 _RANGES = {
     'speed': (0.01, 1000.0), 'seed': (0, 2 ** 31 - 1), 'recording': (0, 2 ** 31 - 1),
