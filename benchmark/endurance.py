@@ -97,7 +97,8 @@ class Run:
         settled = 0
         with self._board as board:
             board.enable(True)
-            while self.arm.time < arm_time or self.setpoints < setpoints:
+            while (not self.arm.heated or self.arm.time < arm_time
+                   or self.setpoints < setpoints):
                 for _ in range(BURST):
                     board.set_voltage(self._rng.uniform(0.0, 5.0))
                     self.setpoints += 1

@@ -13,11 +13,10 @@ import contextlib
 import os
 from pathlib import Path
 import random
-import subprocess
-import sys
 import tempfile
 import time
 
+from benchmark.child import child, own_domain
 from benchmark.watched_arm import CABLE, memory, WatchedArm
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
@@ -59,7 +58,7 @@ def endurance_node_benchmarks(quick: bool) -> dict:
         Setpoints, faults, lost messages, missed watchdogs and growth of the node's memory.
     """
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    domain = 1 + os.getpid() % 100
+    domain = own_domain()
     port = SimulatedPort(f'sim://bicep?speed={SPEED:g}&{CABLE}')
     arm = WatchedArm(port.cable, WATCHDOG * SPEED, random.Random(2))
     with contextlib.ExitStack() as stack:
@@ -69,7 +68,12 @@ def endurance_node_benchmarks(quick: bool) -> dict:
         rclpy.init(args=[], context=context, domain_id=domain)
         stack.callback(rclpy.shutdown, context=context)
         recorder = stack.enter_context(Recorder(context, folder))
-        process = stack.enter_context(_bridge(terminal.name, domain))
+        parameters = {'port': terminal.name, 'telemetry_rate': 1.0, 'telemetry_timeout': 2.0,
+                      'board_watchdog': WATCHDOG, 'autostart': 'false'}
+        words = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
+        process = stack.enter_context(child(
+            NODE, ['--ros-args', *words, '--log-level', 'fatal'],
+            dict(os.environ, ROS_DOMAIN_ID=str(domain))))
         recorder.begin()
         growth = recorder.drive(arm, QUICK_ARM_TIME if quick else ARM_TIME, process.pid)
         said = recorder.stand_still()
@@ -144,7 +148,7 @@ class Recorder:
         """Publish setpoints for so long; return by how much the node's memory has grown."""
         start, began = time.monotonic(), arm.time
         settled, asked, published, answer = 0, start, start, None
-        while arm.time - began < arm_time:
+        while not arm.heated or arm.time - began < arm_time:
             now = time.monotonic()
             # Diagnostics come every second; a machine that is slow gets fewer setpoints.
             if now - published > 1.0 / RATE and self.setpoints - self._counted() < MOST_WAITING:
@@ -211,23 +215,3 @@ class Recorder:
         end = time.monotonic() + seconds
         while (pause := end - time.monotonic()) > 0.0:
             self._executor.spin_once(timeout_sec=pause)
-
-
-@contextlib.contextmanager
-def _bridge(terminal: str, domain: int):
-    """Run the node as a process, not yet configured."""
-    parameters = {'port': terminal, 'telemetry_rate': 1.0, 'telemetry_timeout': 2.0,
-                  'board_watchdog': WATCHDOG, 'autostart': 'false'}
-    arguments = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
-    child = subprocess.Popen(
-        [sys.executable, '-c', NODE, '--ros-args', *arguments, '--log-level', 'fatal'],
-        env=dict(os.environ, ROS_DOMAIN_ID=str(domain)))
-    try:
-        yield child
-    finally:
-        child.terminate()
-        try:
-            child.wait(timeout=PATIENCE)
-        except subprocess.TimeoutExpired:
-            child.kill()
-            child.wait()

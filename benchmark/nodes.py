@@ -9,10 +9,9 @@ each in turn, so that what else the machine does falls on all of them alike.
 
 import contextlib
 import os
-import subprocess
-import sys
 import time
 
+from benchmark.child import child, own_domain
 import numpy as np
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -51,14 +50,16 @@ def node_benchmarks(quick: bool) -> dict:
         Median and 99th percentile of the latency, as such and over those of a bare relay chain of
         two hops in the same run; targets lost at 500 a second.
     """
-    domain = 1 + os.getpid() % 100
+    domain = own_domain()
     environment = dict(os.environ, ROS_DOMAIN_ID=str(domain),
                        ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     with contextlib.ExitStack() as stack:
         for name, codes in CHAINS.items():
             for code in codes:
-                stack.enter_context(_process(code, name, environment))
+                stack.enter_context(child(code, [
+                    '--ros-args', '-r', f'__ns:=/{name}', '-p', 'republish_period:=0.0',
+                    '--log-level', 'error'], environment))
         context = rclpy.Context()
         rclpy.init(args=[], context=context, domain_id=domain)
         stack.callback(rclpy.shutdown, context=context)
@@ -182,19 +183,3 @@ def relay(source: str, destination: str, kind: str) -> None:
         node.create_subscription(
             before, source, lambda message: publisher.publish(convert(message)), COMMANDS)
         rclpy.spin(node)
-
-
-@contextlib.contextmanager
-def _process(code, namespace, environment):
-    arguments = ['--ros-args', '-r', f'__ns:=/{namespace}', '-p', 'republish_period:=0.0',
-                 '--log-level', 'error']
-    child = subprocess.Popen([sys.executable, '-c', code, *arguments], env=environment)
-    try:
-        yield child
-    finally:
-        child.terminate()
-        try:
-            child.wait(timeout=PATIENCE)
-        except subprocess.TimeoutExpired:
-            child.kill()
-            child.wait()

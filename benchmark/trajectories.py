@@ -19,6 +19,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from benchmark.child import own_domain
 from benchmark.nodes import PATIENCE
 from hysteresis_ros.errors import HysteresisError
 from hysteresis_ros.nodes.qos import COMMANDS
@@ -47,7 +48,7 @@ def trajectory_benchmarks(quick: bool) -> dict:
     """
     if quick:
         return {}
-    domain = 1 + os.getpid() % 100
+    domain = own_domain()
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = str(domain)
     context = rclpy.Context()

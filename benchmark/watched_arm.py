@@ -3,6 +3,7 @@
 """A simulated arm that is disturbed at random, and watched for heat for which nobody asked."""
 
 from collections.abc import Callable
+import math
 from pathlib import Path
 import random
 
@@ -12,7 +13,7 @@ from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
 TROUBLES = ('unplug', 'silent', 'deaf', 'late', 'mad', 'frozen', 'supply_low', 'supply_off',
             'supply_double', 'encoder_still')
 GAP, DURATION = (20.0, 60.0), (1.0, 60.0)           # s of the arm, between faults and of one
-FIRST = 10.0                # s of the arm at which the first one comes
+FIRST = 10.0                # s of the arm from its first heat to the first of them
 # Bytes that are spoiled in both directions, all the time.
 CABLE = 'drop=0.0005&flip=0.0005&double=0.0005&garbage=0.01'
 
@@ -41,7 +42,7 @@ class WatchedArm:
         self.faults = self.missed = 0
         self._cable = cable
         self._rng = rng
-        self._next_fault = FIRST
+        self._next_fault = math.inf
         self._heated = 0        # ticks
         self._heard = 0.0       # when a setpoint last reached the board [s of the arm]
         self._longest = watchdog + 2.0 * TICK / 1000.0
@@ -76,6 +77,8 @@ class WatchedArm:
 
         def live(dt: float, voltage: float) -> None:
             # Not by the duty, which a board without power keeps.
+            if voltage > 0.0 and not self._heated:
+                self._next_fault = self.time + FIRST
             self._heated += voltage > 0.0
             self.missed += voltage > 0.0 and self.time - self._heard > self._longest
             advance(dt, voltage)

@@ -57,7 +57,8 @@ def test_every_benchmark_runs(root, tmp_path):
                  'controller_setpoint_p99_over_median_ratio', 'compensator_node_warm_start_s',
                  'compare_240_rows_command_warm_start_s', 'identify_bench_s',
                  'node_chain_latency_median_ms', 'endurance_heated_ratio',
-                 'endurance_node_heated_ratio', 'endurance_node_published_count'):
+                 'endurance_node_heated_ratio', 'endurance_node_published_count',
+                 'monitor_share_of_core_ratio', 'monitor_samples_per_s'):
         assert content[name] > 0.0, name
     for name in ('endurance_lost_in_the_bag_count', 'endurance_missed_watchdogs_count',
                  'endurance_node_lost_in_the_bag_count', 'endurance_node_setpoints_lost_count',
