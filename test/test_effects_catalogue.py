@@ -21,10 +21,13 @@ from model_support import arm_run, bicep_model, effect_of, STRENGTHS, wandering_
 EXPECTED = {
     'supply_sag': ('electrical', 'V', 'at the wire', {'airflow'}),
     'pwm_dead_zone': ('electrical', 'low V', 'fine steps', {'ambient_drift'}),
+    'measured_supply': ('electrical', 'recorded supply', 'log the supply',
+                        {'supply_sag', 'ambient_drift'}),
     'resistance_change': ('electrical', 'middle of the loop', 'current', {'stress_dependence'}),
     'thermal_lag': ('thermal', 'time since a step', 'several rates',
                     {'latency', 'viscous_friction', 'creep'}),
     'heating_cooling_asymmetry': ('thermal', 'sign of dV/dt', 'up and down', {'thermal_lag'}),
+    'valve_lag': ('thermal', 'time since a step', 'up and down', {'creep', 'latency'}),
     'latent_heat': ('thermal', 'inside the loop', 'small steps', {'thermal_lag'}),
     'ambient_temperature': ('thermal', 'ambient', 'log the ambient', {'ambient_drift'}),
     'ambient_drift': ('thermal', 'time of day', 'repeat the same loop', {'fatigue', 'creep'}),
@@ -35,6 +38,8 @@ EXPECTED = {
                                 {'series_compliance'}),
     'r_phase': ('material', 'shoulder on cooling', 'staircase', {'slack'}),
     'creep': ('material', 'log time', '300 s', {'thermal_lag', 'ambient_drift'}),
+    'viscoelastic_creep': ('material', 'time under load', 'half an hour',
+                           {'series_compliance', 'fatigue'}),
     'fatigue': ('material', 'cycle count', 'reference loop', {'ambient_drift'}),
     'slack': ('material', 'low force', 'preload', {'r_phase', 'geometry_error'}),
     'series_compliance': ('material', 'force', 'weights', {'payload_error', 'geometry_error'}),
@@ -63,8 +68,11 @@ EXPECTED = {
 # Effect, parameter: unit and plausible range for a 0.2 mm wire on this arm.
 RANGES = {
     ('supply_sag', 'Rs'): ('Ohm', 0.05, 2.0), ('pwm_dead_zone', 'Vd'): ('V', 0.05, 1.5),
+    ('measured_supply', 'nominal'): ('V', 3.0, 60.0),
     ('thermal_lag', 'time_constant'): ('s', 0.05, 100.0),
+    ('valve_lag', 'filling'): ('s', 0.05, 100.0), ('valve_lag', 'venting'): ('s', 0.05, 100.0),
     ('heating_cooling_asymmetry', 'ratio'): ('1', 0.5, 2.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
+    ('viscoelastic_creep', 'J'): ('% of l0', 0.01, 2.0),
     ('creep', 'c'): ('% of l0', 0.01, 0.5), ('slack', 'Ls'): ('mm', 0.1, 5.0),
     ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),
     ('coulomb_friction', 'tau_c'): ('N m', 0.001, 0.150),
@@ -123,7 +131,8 @@ def test_starts_and_neutral_value_lie_within_the_bounds_of_a_fit(name):
 def test_neutral_values_are_no_effect_at_all(name):
     model = bicep_model()
     voltage = wandering_voltage(60)
-    for run in (arm_run(voltage, 0.1, ambient_temperature=np.full(60, 30.0)),
+    for run in (arm_run(voltage, 0.1, ambient_temperature=np.full(60, 30.0),
+                        supply_voltage=np.full(60, 10.0)),
                 arm_run(voltage, 30.0)):
         neutral = catalogue()[name](model.surroundings)
         np.testing.assert_array_equal(
@@ -134,7 +143,8 @@ def test_neutral_values_are_no_effect_at_all(name):
 def test_every_effect_changes_what_an_arm_run_shows(name):
     model = bicep_model()
     run = arm_run(np.tile(wandering_voltage(60), 2), 0.5,
-                  ambient_temperature=np.linspace(20.0, 30.0, 120))
+                  ambient_temperature=np.linspace(20.0, 30.0, 120),
+                  supply_voltage=np.linspace(12.0, 10.0, 120))
     simulator = Simulator(model, run)
     change = simulator.run([effect_of(model, name)]) - simulator.run([])
     assert np.all(np.isfinite(change))

@@ -14,10 +14,11 @@ from hysteresis_ros.model.chain import Chain
 
 # A wire of 0.27 m that sees up to 6 V.
 WIRE = Surroundings(0.27, 3.0, 36.0, 0.02)
-ROOM = Inputs(10.0, 1200.0, 0.5, 31.0, 0.3, 4.0)
+ROOM = Inputs(10.0, 1200.0, 0.5, 31.0, 0.3, 4.0, 10.5)
 STATELESS = {
     # Effect, values, input, output worked out by hand.
     'supply_sag': ({'Rs': 2.0}, 5.0, 5.0 * 8.0 / 10.0),
+    'measured_supply': ({'nominal': 12.0}, 4.0, 4.0 * 10.5 / 12.0),
     'pwm_dead_zone': ({'Vd': 1.0}, 3.0, 2.0 * 6.0 / 5.0),
     'resistance_change': ({'eta': 0.2}, 4.0, math.sqrt(16.0 / (1.0 + 0.2 * 0.3))),
     'ambient_temperature': ({'gain': 0.4, 'reference': 24.0}, 9.0, 9.0 + 0.4 * 7.0),
@@ -91,6 +92,7 @@ def heat_balance(volts, dt, up, down):
 @pytest.mark.parametrize('name, values, up, down', [
     ('thermal_lag', {'time_constant': 4.0}, 0.25, 0.25),
     ('heating_cooling_asymmetry', {'time_constant': 4.0, 'ratio': 1.6}, 0.4, 0.25),
+    ('valve_lag', {'filling': 2.5, 'venting': 4.0}, 0.4, 0.25),
     ('latent_heat', {'time_constant': 4.0, 'latent': 0.3}, 0.25, 0.25)])
 def test_lags_solve_the_heat_balance_exactly(name, values, up, down):
     volts = np.array([5.0, 5.0, 1.0, 3.0, 0.0, 6.0])
@@ -221,6 +223,7 @@ def test_each_chain_has_a_memory_of_its_own_that_can_be_saved():
 @pytest.mark.parametrize('name, values', [
     ('thermal_lag', {'time_constant': 3.0}),
     ('heating_cooling_asymmetry', {'time_constant': 3.0, 'ratio': 1.7}),
+    ('valve_lag', {'filling': 0.8, 'venting': 2.0}),
     ('latent_heat', {'time_constant': 2.0, 'latent': 0.4})])
 def test_a_whole_trial_is_the_same_as_step_by_step(name, values):
     rng = np.random.default_rng(4)

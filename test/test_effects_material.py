@@ -29,7 +29,8 @@ def inputs(time, cycles=None, phase=None):
     none = np.full(len(time), np.nan)
     return Inputs(time, time, np.diff(time, prepend=0.0), none,
                   none if phase is None else np.asarray(phase, dtype=float),
-                  np.zeros(len(time)) if cycles is None else np.asarray(cycles, dtype=float))
+                  np.zeros(len(time)) if cycles is None else np.asarray(cycles, dtype=float),
+                  none, none)
 
 
 def test_stress_dependence_weighs_the_load_more_about_the_bench_mean():

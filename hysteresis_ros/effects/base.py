@@ -101,7 +101,8 @@ class Inputs(NamedTuple):
     `time` [s] runs from the start of the trial, `clock` [s] from the start of the recording, `dt`
     is the time since the row before [s]; `ambient` [degC] is NaN where not recorded; `phase` is the
     martensite share (0 hot and short, 1 cold and long) of a first pass; `cycles` counts the travel
-    of the drive since the recording began, in full strokes there and back.
+    of the drive since the recording began, in full strokes there and back; `supply` [V] and
+    `load` are NaN where not recorded, as the load of an arm.
     """
 
     time: Values
@@ -110,6 +111,8 @@ class Inputs(NamedTuple):
     ambient: Values
     phase: Values
     cycles: Values
+    supply: Values = math.nan
+    load: Values = math.nan
 
 
 class Surroundings(NamedTuple):
@@ -180,6 +183,8 @@ class Effect(abc.ABC):
     needs_phase: ClassVar[bool] = False
     # A recorded column without which the effect cannot be told.
     needs_column: ClassVar[str | None] = None
+    # What changes by less there is a constant with noise on it, in the column's unit.
+    smallest_change: ClassVar[float] = 0.0
     # Whether every muscle under load has it, so that nobody has to prove that it is there.
     universal: ClassVar[bool] = False
     # Whether a controller undoes it.
@@ -212,6 +217,12 @@ class Effect(abc.ABC):
     def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Return the parameters with the units and ranges that suit the muscle."""
         return cls.parameters
+
+    def __copy__(self) -> 'Effect':
+        """Return one with the same values, and a past of its own from now on."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        return other
 
     def start(self) -> None:
         """Forget the past: a trial starts, from the cold muscle at rest."""
@@ -271,3 +282,8 @@ class Effect(abc.ABC):
     def available(cls, surroundings: Surroundings) -> bool:
         """Whether the effect makes sense for this muscle, whatever was recorded."""
         return True
+
+    @classmethod
+    def doubtful(cls, surroundings: Surroundings) -> bool:
+        """Whether only its user knows if the muscle can have it; it is tried where it is named."""
+        return False

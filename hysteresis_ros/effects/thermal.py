@@ -11,6 +11,7 @@ They act in the order of this file: the heat transfer divides what comes in, the
 what the air adds comes last, because it changes slowly and the wire is in balance with it.
 """
 
+from collections.abc import Sequence
 import math
 
 import numpy as np
@@ -77,6 +78,11 @@ class FirstOrderLag(ThermalEffect):
     _q: float | None
     _phase: float | None
 
+    @classmethod
+    def available(cls, surroundings: Surroundings) -> bool:
+        """Whether there is heat that has to come and go; of pressure see `valve_lag`."""
+        return surroundings.drive != 'pressure'
+
     # Without a chain the heat is exchanged as on the bench.
     speed = 1.0
     # How much larger the heat capacity counts, where a controller takes latent heat for that.
@@ -99,12 +105,18 @@ class FirstOrderLag(ThermalEffect):
 
         They are those of its interval, and at least a share `margin` from the value.
         """
-        value = self.time_constant
-        low, high = self.intervals.get('time_constant', (value, value))
-        ends = min(low, (1.0 - margin) * value), max(high, (1.0 + margin) * value)
-        if value <= 0.0 or ends == (value, value):
-            return []
-        return [self.with_values(time_constant=max(end, 1e-3 * value)) for end in ends]
+        return self._extremes(('time_constant',), margin)
+
+    def _extremes(self, names: Sequence[str], margin: float) -> list[Effect]:
+        ends: dict[str, tuple[float, float]] = {}
+        for name in names:
+            value = self.values[name]
+            low, high = self.intervals.get(name, (value, value))
+            low, high = min(low, (1.0 - margin) * value), max(high, (1.0 + margin) * value)
+            if value > 0.0 and low < high:
+                ends[name] = max(low, 1e-3 * value), high
+        return [self.with_values(**{name: pair[side] for name, pair in ends.items()})
+                for side in (0, 1)] if ends else []
 
     def start(self) -> None:
         """Forget the past: q is that of the cold state."""
@@ -129,7 +141,7 @@ class FirstOrderLag(ThermalEffect):
     def _released(self, before: Values, phase: Values, dt: Values, surroundings: Surroundings
                   ) -> Values:
         """Return what changing from the phase `before` within `dt` [s] adds to q."""
-        return 0.0 * np.nan_to_num(phase)
+        return np.zeros(np.shape(phase))
 
     def forward(self, signal: np.ndarray, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Do what `step` does for a whole trial."""
@@ -234,6 +246,7 @@ class AmbientTemperature(ThermalEffect):
     experiment = 'log the ambient temperature on a cold and on a warm day'
     confused_with = ('ambient_drift',)
     needs_column = 'ambient_temperature'
+    smallest_change = 0.5
     parameters = (
         Parameter('gain', 'V^2/K', 'd1/d2: drive squared that one kelvin stands for', 0.02, 2.0,
                   0.0, (0.2, 0.6), log=True),

@@ -161,7 +161,7 @@ class Arm:
     @property
     def supply_voltage(self) -> float:
         """What the board measures of its own supply [V]."""
-        return sensors.supply_meter(self._rng)
+        return sensors.supply_meter(self.conditions.supply.voltage(self.time), self._rng)
 
     def _room(self) -> float:
         air = self.conditions.air

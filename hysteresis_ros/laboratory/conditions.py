@@ -14,6 +14,7 @@ from hysteresis_ros.laboratory.encoder_disc import EncoderDisc
 from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.heat import HeatBalance, ROOM
 from hysteresis_ros.laboratory.linkage import Linkage
+from hysteresis_ros.laboratory.supply import Supply
 from hysteresis_ros.laboratory.wire import Material
 
 # Resistance of a wire when it is austenite [Ohm], and the board's full voltage [V].
@@ -103,6 +104,8 @@ class Conditions:
         Eq. 1.
     air : Air
         The room.
+    supply : Supply
+        Of the board.
     lead_resistance : float
         Of board and leads, in series with each wire [Ohm].
     dead_voltage : float
@@ -145,6 +148,7 @@ class Conditions:
     linkage: Linkage = Linkage()
     heat: HeatBalance = dataclasses.field(default_factory=HeatBalance)
     air: Air = dataclasses.field(default_factory=Air)
+    supply: Supply = Supply()
     lead_resistance: float = 0.0
     dead_voltage: float = 0.0
     resistance_growth: float = 0.0

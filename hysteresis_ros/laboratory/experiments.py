@@ -7,6 +7,8 @@ Whole experiments, written as the tables that a user would have. None says what 
 bench          force.csv: trial 0 the damped oscillation, trial 1 random; length.csv: trials 0 to 3
                the damped oscillation under four loads, trials 4 to 7 random; geometry.yaml, where
                the muscle is a wire
+bench-dynamic  length.csv: a muscle that is no wire under three loads, steps of all speeds,
+               sampled at 5 Hz
 arm-steps      train.csv, test.csv: sinusoid, random, staircase, ramps, each step held for 30 s
 arm-dynamic    train.csv, test.csv: steps, ramps, a repeated loop and long holds, sampled at 10 Hz
 ============== =====================================================================================
@@ -23,7 +25,8 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import sequences
 from hysteresis_ros.laboratory.bench import HOLD
 from hysteresis_ros.laboratory.linkage import GEOMETRY
-from hysteresis_ros.laboratory.plant import bench_of, BRISK, MUSCLES, Plant
+from hysteresis_ros.laboratory.plant import bench_of, BRISK, MUSCLES, Plant, SOFT_MUSCLES
+from hysteresis_ros.laboratory.soft_bench import SoftBench
 from hysteresis_ros.laboratory.wire import Material
 from hysteresis_ros.measurements.csv import write_csv
 from hysteresis_ros.spelling import unknown
@@ -33,6 +36,8 @@ LOADS = Material.loads
 FORCE_STEPS, LENGTH_STEPS = 74, 51
 ARM_STEPS = 60
 GEOMETRY_FILE = 'geometry.yaml'
+# Of a continuous recording on the bench: time between samples, and of a trial [s].
+SLOW_SAMPLING, RUN = 0.2, 120.0
 
 Table = dict[str, np.ndarray]
 
@@ -57,6 +62,25 @@ def bench_tables(effects: Mapping[str, float], seed: int,
                            'length': bench.length_trial(drive, load)})
     return {'force.csv': _stack(force, ['trial', 'step', name, 'force']),
             'length.csv': _stack(length, ['trial', 'step', name, 'force', 'length'])}
+
+
+def bench_dynamic_tables(effects: Mapping[str, float], seed: int,
+                         muscle: str = 'mckibben') -> dict[str, Table]:
+    """Return the table of continuous recordings on the bench, by file name."""
+    bench = bench_of(seed, effects, muscle=muscle)
+    if not isinstance(bench, SoftBench):
+        raise ParameterError(f'laboratory: bench-dynamic is for {" and ".join(SOFT_MUSCLES)}, not '
+                             f'for {muscle}; record wires on the arm, with arm-dynamic')
+    material, rng = bench.material, np.random.default_rng([seed, 24])
+    every = round(SLOW_SAMPLING / sequences.SAMPLING)
+    length = []
+    for load in material.loads[:3]:
+        drive = material.highest_drive / sequences.HIGHEST * np.concatenate((
+            np.zeros(10), sequences.steps_of_all_speeds(rng, RUN)[::every]))
+        length.append({'time': np.round(SLOW_SAMPLING * np.arange(1, len(drive) + 1), 3),
+                       material.drive: drive, 'force': np.full(len(drive), load),
+                       'length': bench.length_run(SLOW_SAMPLING, drive, load)})
+    return {'length.csv': _stack(length, ['time', 'trial', material.drive, 'force', 'length'])}
 
 
 def arm_step_tables(effects: Mapping[str, float], seed: int,
@@ -102,8 +126,8 @@ def _stack(trials: list[Table], columns: list[str]) -> Table:
     return {name: np.concatenate([table[name] for table in trials]) for name in columns}
 
 
-EXPERIMENTS = {'bench': bench_tables, 'arm-steps': arm_step_tables,
-               'arm-dynamic': arm_dynamic_tables}
+EXPERIMENTS = {'bench': bench_tables, 'bench-dynamic': bench_dynamic_tables,
+               'arm-steps': arm_step_tables, 'arm-dynamic': arm_dynamic_tables}
 
 
 def experiment_tables(name: str, effects: Mapping[str, float] | None = None,

@@ -20,6 +20,7 @@ from hysteresis_ros.laboratory.cable import Cable
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.encoder_disc import EncoderDisc
 from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
+from hysteresis_ros.laboratory.supply import Supply
 from hysteresis_ros.laboratory.unlisted import Unlisted, UNLISTED
 from hysteresis_ros.spelling import unknown
 
@@ -63,6 +64,13 @@ class Effect:
 def _supply_sag(conditions: Conditions, size: float, specimen: np.random.Generator,
                 recording: np.random.Generator) -> None:
     conditions.lead_resistance = 0.9 * size
+
+
+def _measured_supply(conditions: Conditions, size: float, specimen: np.random.Generator,
+                     recording: np.random.Generator) -> None:
+    conditions.supply = Supply(
+        drain=0.2 * size, dip=0.07 * size, duration=conditions.recording_time,
+        begin=recording.uniform(0.0, 1.0))
 
 
 def _pwm_dead_zone(conditions: Conditions, size: float, specimen: np.random.Generator,
@@ -289,6 +297,8 @@ LATER = {
                              _cable_friction),
     'encoder_eccentricity': Effect("The encoder's disc sits off the centre of its shaft.",
                                    _encoder_eccentricity),
+    'measured_supply': Effect('The battery runs down and dips; the board counts on its nominal '
+                              'voltage, and a meter records it.', _measured_supply),
 }
 
 EFFECTS = {**LISTED, **{name: Effect(kind.__doc__ or '', _disturb(kind), listed=False)

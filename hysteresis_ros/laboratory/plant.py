@@ -31,6 +31,7 @@ from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.heat import HeatBalance
 from hysteresis_ros.laboratory.hidden_physics import apply_effects
+from hysteresis_ros.laboratory.hidden_soft import with_effects
 from hysteresis_ros.laboratory.lagoudas import LagoudasMaterial
 from hysteresis_ros.laboratory.mckibben import McKibbenMaterial
 from hysteresis_ros.laboratory.scp import ScpMaterial
@@ -83,7 +84,7 @@ def bench_of(seed: int, effects: Mapping[str, float] | None = None, recording: i
     seed : int
         Of the specimen and of all noise.
     effects : mapping of str to float
-        Strengths of hidden effects, see `Plant`; for wires only.
+        Strengths of hidden effects, see `Plant` and `hidden_soft`.
     recording : int
         Which recording of the same specimen: another one has other noise.
     muscle : str
@@ -95,12 +96,9 @@ def bench_of(seed: int, effects: Mapping[str, float] | None = None, recording: i
         For a muscle or an effect that does not exist, or an effect that the muscle cannot have.
     """
     if muscle in SOFT_MUSCLES:
-        if effects:
-            raise ParameterError(f'laboratory: a {muscle} muscle cannot have {next(iter(effects))}:'
-                                 ' the effects are those of shape memory wires; choose one of '
-                                 f'{", ".join(MUSCLES)}')
         material = SOFT_MUSCLES[muscle].specimen(np.random.default_rng([seed, 101]))
-        return SoftBench(material, seed=[seed, recording, 11])
+        changed, tendon = with_effects(material, effects or {}, seed)
+        return SoftBench(changed, [seed, recording, 11], tendon)
     if muscle not in MUSCLES:
         every = [*MUSCLES, *SOFT_MUSCLES]
         raise ParameterError(f'laboratory: {unknown("muscle", muscle, every)}')
@@ -192,7 +190,7 @@ class Plant:
         self.arm.heat_and_cool()
         rows = []
         for voltage in voltages.tolist():
-            self.arm.settle(hold, voltage)
+            self.arm.settle(hold, self._applied(voltage, hold))
             rows.append(self.read())
         return self._columns(hold * np.arange(1, len(voltages) + 1), voltages, rows)
 
@@ -218,7 +216,7 @@ class Plant:
         self.arm.heat_and_cool()
         rows = []
         for dt, value in zip(np.diff(time, prepend=0.0).tolist(), voltage.tolist()):
-            self.arm.advance(dt, value)
+            self.arm.advance(dt, self._applied(value, dt))
             rows.append(self.read())
         return self._columns(time, voltage, rows)
 
@@ -227,7 +225,11 @@ class Plant:
         arm = self.arm
         return (sensors.counted_angle(arm.encoder_counts),
                 sensors.thermometer(arm.conditions.air.recorded(arm.time), self._rng),
-                sensors.supply_meter(self._rng))
+                sensors.supply_meter(arm.conditions.supply.voltage(arm.time), self._rng))
+
+    def _applied(self, setpoint: float, dt: float) -> float:
+        """Return the voltage [V] that a board gives for `dt` [s] which counts on its supply."""
+        return setpoint * self.arm.conditions.supply.share(self.arm.time + dt)
 
     @staticmethod
     def _columns(time: ArrayLike, voltage: ArrayLike,

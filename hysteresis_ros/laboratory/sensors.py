@@ -46,6 +46,6 @@ def thermometer(temperature: float, rng: np.random.Generator) -> float:
     return AMBIENT_RESOLUTION * round(noisy / AMBIENT_RESOLUTION)
 
 
-def supply_meter(rng: np.random.Generator) -> float:
-    """Return the board's reading of its own regulated supply [V]."""
-    return SUPPLY + SUPPLY_NOISE * rng.standard_normal()
+def supply_meter(supply: float, rng: np.random.Generator) -> float:
+    """Return the board's reading of its own supply [V]."""
+    return supply + SUPPLY_NOISE * rng.standard_normal()

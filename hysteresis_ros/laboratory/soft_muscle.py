@@ -9,6 +9,7 @@ temperature follow what is applied, and rubber and polymers creep.
 """
 
 import abc
+import dataclasses
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from hysteresis_ros.laboratory.solve import RootFinder
 
 
+@dataclasses.dataclass(frozen=True)
 class SoftMaterial(abc.ABC):
     """
     Constants of one batch of muscles, and how a bench treats them.
