@@ -18,16 +18,19 @@ GEOMETRY = BicepGeometry(
 
 # An effect of each kind with values in its range, as it would show in an arm run.
 STRENGTHS = {
-    'supply_sag': {'Rs': 0.4}, 'pwm_dead_zone': {'Vd': 0.4}, 'resistance_change': {'eta': 0.1},
+    'supply_sag': {'Rs': 0.4}, 'measured_supply': {'nominal': 11.0},
+    'pwm_dead_zone': {'Vd': 0.4}, 'resistance_change': {'eta': 0.1},
     'airflow': {'beta': 1.2}, 'thermal_lag': {'time_constant': 3.0},
     'heating_cooling_asymmetry': {'time_constant': 3.0, 'ratio': 1.5},
+    'valve_lag': {'filling': 2.0, 'venting': 4.0},
     'latent_heat': {'time_constant': 3.0, 'latent': 0.2},
     'ambient_temperature': {'gain': 0.3, 'reference': 25.0},
     'ambient_drift': {'offset': 0.5, 'rate': 1.0, 'curvature': -0.3},
     'stress_dependence': {'shift': 0.15}, 'stress_dependent_strain': {'r': 0.5, 'F0': 1.2},
     'series_compliance': {'compliance': 0.05}, 'transformation_slopes': {'g': 0.3},
     'r_phase': {'strain': 0.2, 'position': 0.2, 'width': 0.05},
-    'creep': {'c': 0.1, 't0': 3.0}, 'fatigue': {'b': 0.05, 'a': 0.02}, 'slack': {'Ls': 0.5},
+    'creep': {'c': 0.1, 't0': 3.0}, 'viscoelastic_creep': {'J': 0.1, 't0': 10.0},
+    'fatigue': {'b': 0.05, 'a': 0.02}, 'slack': {'Ls': 0.5},
     'unequal_muscles': {'shorter': 0.6, 'longer': 0.9}, 'coulomb_friction': {'tau_c': 0.02},
     'cable_friction': {'mu_phi': 0.1}, 'viscous_friction': {'b': 0.5}, 'inertia': {'I': 0.01},
     'frame_tilt': {'phi': 4.0},
@@ -117,3 +120,17 @@ def heavier_arm(folder, grams, recordings):
     for name, seed in recordings.items():
         write_csv(runs(arm, trials=4, rows=30, seed=seed), folder / name)
     return folder
+
+
+def misses_of_targets(model, low=82.0):
+    """Return by how much [deg] the arm misses angles from `low` to 100 deg within reach."""
+    controller, observer = model.controller(arm=True), model.observer()
+    missed = []
+    for number, theta in enumerate(np.radians(
+            np.random.default_rng(1).uniform(low, 100.0, 25))):
+        point = controller.setpoint(*controller.reference(float(theta)))
+        angle = observer.step(30.0 * (number + 1.0), point.voltage)
+        if not point.saturated:
+            missed.append(float(np.degrees(angle - theta)))
+    assert len(missed) >= 15
+    return np.abs(missed)

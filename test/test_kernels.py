@@ -79,7 +79,7 @@ def test_the_compiled_arm_is_the_reference_in_plain_python(names, dt):
     x = 2.0 * VOLTAGE
     offset = 1e-4 * np.sin(np.arange(len(x)))
     rest, angles, _, _ = model.balance(model.chain()).run(
-        0.5, x, np.full(len(x), dt), offset, np.full(len(x), 0.98))
+        0.5, np.array([len(x)]), x, np.full(len(x), dt), offset, np.full(len(x), 0.98))
     reference = arm_of(model)
     assert reference.settle(0.5) == pytest.approx(rest, abs=1e-12)
     expected = [reference.step(value, dt, added, 0.98)

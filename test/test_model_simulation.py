@@ -108,16 +108,19 @@ def test_judged_rows_are_the_same_where_the_others_are_interpolated(names):
     found, whole = (Simulator(model, run, rows).run(effects)[judged] for rows in (judged, None))
     # What depends on the phase needs all rows, and is only brought into agreement so far.
     away = 2e-3 if any(effect.needs_phase for effect in effects) else 1e-6
+    if 'viscoelastic_creep' in names:
+        # Against a slow drive it may turn the muscle where no input turns.
+        away = 2e-5
     np.testing.assert_allclose(found, whole, rtol=0.0, atol=away)
 
 
 def test_an_arm_at_rest_is_balanced_where_it_is_judged_and_where_an_input_turns(monkeypatch):
     model, balanced = bicep_model(), []
-    run_trial = ArmBalance.run
+    run_trials = ArmBalance.run
 
-    def count(balance, cold, x, *columns):
+    def count(balance, cold, ends, x, *columns):
         balanced.append(len(x))
-        return run_trial(balance, cold, x, *columns)
+        return run_trials(balance, cold, ends, x, *columns)
 
     monkeypatch.setattr(ArmBalance, 'run', count)
     run = arm_run(np.concatenate([np.linspace(0.0, 6.0, 300), np.full(100, 6.0),
@@ -129,6 +132,21 @@ def test_an_arm_at_rest_is_balanced_where_it_is_judged_and_where_an_input_turns(
     assert balanced[0] <= 8 and balanced[1] == 700
     Simulator(model, run, judged).run([], exact=True)
     assert balanced[2] == 700
+
+
+@pytest.mark.parametrize('name', ['payload_error', 'thermal_lag', 'resistance_change'])
+@pytest.mark.parametrize('exact', [True, False])
+def test_trials_of_different_lengths_are_those_of_recordings_of_their_own(name, exact):
+    model = bicep_model()
+    effect = effect_of(model, name)
+    lengths = [50, 120, 80]
+    ends = np.cumsum(lengths)
+    whole = arm_run(VOLTAGE[:ends[-1]], trial=np.repeat([0.0, 1.0, 2.0], lengths),
+                    time=np.concatenate([0.1 * np.arange(1, length + 1) for length in lengths]))
+    found = Simulator(model, whole).run([effect], exact=exact)
+    alone = [Simulator(model, arm_run(VOLTAGE[end - length:end], 0.1)).run([effect], exact=exact)
+             for length, end in zip(lengths, ends)]
+    np.testing.assert_allclose(found, np.concatenate(alone), rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize('name', ['latent_heat', 'resistance_change', 'creep'])
@@ -213,7 +231,8 @@ def test_a_strong_effect_of_the_phase_agrees_with_the_phase_it_causes(monkeypatc
     angles = simulator.run([effect])
     trial, = simulator.trials
     respond = simulator._responder(Chain([effect], model.surroundings))
-    again = respond(trial, trial.inputs._replace(phase=model.martensite(given[-1])))
+    trial.inputs = trial.inputs._replace(phase=model.martensite(given[-1]))
+    again, = respond([trial])
     assert np.sqrt(np.mean((again.values - angles) ** 2)) < math.radians(0.1)
 
 

@@ -9,14 +9,16 @@ import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
 from hysteresis_ros.diagnosis.extend import undetermined
+from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.parameters import ParameterVector
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model.chain import Chain
-from model_support import bicep_model, effect_of
+from model_support import bicep_model, effect_of, misses_of_targets
 
 LOADS = np.linspace(0.0, 12.0, 200)
 
@@ -57,16 +59,7 @@ def test_the_inverse_brings_the_arm_to_its_targets(others):
     model = model.with_effects([
         *model.effects, effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2),
         effect_of(model, 'stress_dependence', C=0.5, follows=0.8)])
-    controller, observer = model.controller(arm=True), model.observer()
-    reached = []
-    for number, theta in enumerate(np.radians(
-            np.random.default_rng(1).uniform(82.0, 100.0, 25))):
-        point = controller.setpoint(*controller.reference(float(theta)))
-        angle = observer.step(30.0 * (number + 1.0), point.voltage)
-        if not point.saturated:
-            reached.append(np.degrees(angle - theta))
-    assert len(reached) >= 15
-    assert np.max(np.abs(reached)) < 0.01
+    assert np.max(misses_of_targets(model)) < 0.01
 
 
 def test_a_form_that_is_not_determined_leaves_the_effect_known():
@@ -84,6 +77,27 @@ def test_the_simplest_form_stays_where_it_was_chosen():
         [effect_of(model, 'stress_dependence', C=0.5, follows=follows)], 'bench').entries]
         for follows in (0.0, 0.5)]
     assert names == [['C'], ['C', 'follows']]
+
+
+def test_a_form_that_comes_out_as_the_simplest_is_free_no_longer():
+    """Intervals and held-out rows are those of the parameters that are left."""
+    tables = bench_tables({}, 20)
+    force, length = (Measurement.from_columns(tables[f'{name}.csv'])
+                     for name in ('force', 'length'))
+    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY),
+                     length_trials=range(4), force_trials=[0]).model
+    problem = problem_for(model, [length])
+    response = Response(problem, [], [
+        effect_of(model, 'stress_dependence', C=0.5, follows=0.5)])
+    vector = response.parameters.vector()
+    vector[1] = response.parameters.lower[1]
+    fit = response.fit(vector)
+    assert fit.effects[0].follows == 0.0
+    assert fit.vector.shape == (1,) and fit.jacobian.shape == (len(fit.predicted), 1)
+    fitter = BenchFitter(problem)
+    effect, = fitter.with_intervals(fit)
+    assert list(effect.intervals) == ['C']
+    assert np.all(np.isfinite(fitter.cross_validate(fit).held_out))
 
 
 def on_bench(muscle):

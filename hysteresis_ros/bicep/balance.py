@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 GRID = math.radians(0.1)
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
+_NO_MUSCLE = np.zeros((0, 4)), 0.0
 # Load [N] over which the slope of what the transformation feels is taken.
 SMALL_LOAD = 1e-3
 # Longest dt of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
@@ -75,7 +76,6 @@ class ArmBalance:
         self.has_dynamics = chain.moves
         # Range of H2's input, in the unit of the load.
         self.span = operator.upper - operator.lower
-        compliance = chain.compliance()
         several = len(chain.offsets) > 1
         wires, self.operators, memories = wires_of(operator, chain, loaded)
         # At rest, and where the arm sinks and rises against dry friction.
@@ -83,10 +83,10 @@ class ArmBalance:
         lines = [_line(statics, leverage * grip ** sense, sense * self.coulomb, self.base, chain,
                        loaded) for sense in senses]
         # Where the wires only stretch the arm is stiffest, and rings fastest.
-        stiffness = grip * np.max(leverage * statics.moment_arm) / (
-            compliance or wires.compliance)
+        stiffness = grip * np.max(leverage * statics.moment_arm) / wires.compliance
         swings = self.has_dynamics and loaded and not several
-        loads, spacing = _muscle(chain, statics, leverage / grip, LOADS if swings else 2)
+        # An arm that does not swing has no use for the table of its muscle.
+        loads, spacing = _muscle(chain, statics, leverage / grip) if swings else _NO_MUSCLE
         self._arm = Arm(
             wires=wires,
             grid=np.column_stack([statics.theta, statics.length, statics.moment, leverage,
@@ -159,17 +159,19 @@ class ArmBalance:
         return self._kernels.step(self._arm, self._state, float(x), float(dt), float(offset),
                                   float(factor))
 
-    def run(self, cold: float, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
+    def run(self, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
             factor: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """
-        Run a whole trial from the cold state.
+        Run whole trials, each from the cold state.
 
         Parameters
         ----------
         cold : float
             Output of the first stage in the cold state.
+        ends : ndarray of int, shape (trials,)
+            Where each trial ends and the next begins.
         x, dt, offset, factor : ndarray, shape (rows,)
-            As for `step`.
+            As for `step`, for the rows of all trials.
 
         Returns
         -------
@@ -178,7 +180,7 @@ class ArmBalance:
         angles, outputs, inputs : ndarray, shape (rows,)
             Angle [rad], output of H2 [m], and input of the first muscle's H2.
         """
-        return self._kernels.run(self._arm, self._state, float(cold), *(
+        return self._kernels.run(self._arm, self._state, float(cold), ends, *(
             np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))
 
 
@@ -203,17 +205,15 @@ def _line(statics: Statics, leverage: np.ndarray, friction: float, base: float, 
     if loaded:
         load = chain.load_inside(force)
         weight = (chain.load_inside(force + SMALL_LOAD) - load) / SMALL_LOAD
-    scale = chain.scale(force) + 0.0 * force
+    scale = chain.scale(force)
     demand = (statics.length - base - chain.stretch(force)) / scale
     # Past a fold, where the arm would fall, the nearest stable state is kept.
     return (np.maximum.accumulate(demand), load, weight / leverage, 1.0 / scale,
-            chain.loop_width(force) + 0.0 * force)
+            chain.loop_width(force))
 
 
-def _muscle(chain: Chain, statics: Statics, leverage: np.ndarray, count: int
-            ) -> tuple[np.ndarray, float]:
-    """Return a muscle's table over its load, shape (count, 4), and the spacing of the loads [N]."""
-    loads = np.linspace(0.0, LARGEST * np.max(np.abs(statics.moment / leverage)), count)
-    columns = (chain.load_inside(loads), chain.scale(loads), chain.stretch(loads),
-               chain.loop_width(loads))
-    return np.column_stack([column + 0.0 * loads for column in columns]), float(loads[1])
+def _muscle(chain: Chain, statics: Statics, leverage: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return a muscle's table over its load, shape (LOADS, 4), and the spacing of the loads [N]."""
+    loads = np.linspace(0.0, LARGEST * np.max(np.abs(statics.moment / leverage)), LOADS)
+    return np.column_stack([chain.load_inside(loads), chain.scale(loads), chain.stretch(loads),
+                            chain.loop_width(loads)]), float(loads[1])

@@ -83,14 +83,12 @@ def with_own_memories(operators: Sequence[HysteresisOperator]
     memories : ndarray, shape (operators, entries)
         Rows that the copies read and write; of operators that are not compiled the copies.
     """
-    copies = [copy.deepcopy(operator) for operator in operators]
-    compiled = [operator for operator in copies if isinstance(operator, CompiledOperator)]
+    compiled = [operator for operator in operators if isinstance(operator, CompiledOperator)]
     if not compiled:
+        copies = [copy.deepcopy(operator) for operator in operators]
         return copies, copies
     memories = np.empty((len(compiled), len(compiled[0].memory)))
-    for row, operator in zip(memories, compiled):
-        operator.move_memory(row)
-    return copies, memories
+    return [operator.with_memory(row) for operator, row in zip(compiled, memories)], memories
 
 
 def kernels_for(operator: HysteresisOperator, module: types.ModuleType) -> Any:

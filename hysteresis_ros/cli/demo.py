@@ -35,9 +35,13 @@ ENTRIES = ('bench', 'model.yaml', 'run', 'run.log', 'extended.yaml', 'run_extend
 # which the arm's time may not run much faster than the nodes can follow.
 SETTLED_HOLD = 30.0
 PASSING_HOLD, PASSING_SPEED = 6.0, 12.0
-# The arm's time against the wall clock's, and the port with the firmware in simavr.
-SIMULATED_SPEED, AVR_SPEED = 60.0, 0.4
+# The arm's time against the wall clock's.
+SIMULATED_SPEED = 60.0
+# The port with the firmware in simavr. A chip in software is slow, so that it is driven through a
+# few targets, after short cycles of heating and cooling.
 AVR = 'avr://'
+AVR_SPEED, AVR_VALUES = 0.8, 4
+AVR_CYCLE = {'initialise_heat_time': 10.0, 'initialise_cool_time': 30.0}
 LATEST_ANGLE = 5.0      # s; --hidden latency makes them late
 
 
@@ -56,9 +60,9 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     parser.add_argument('--speed', type=float, metavar='X',
                         help="the arm's time against the wall clock's (default: 60)")
     parser.add_argument('--port', metavar='PORT',
-                        help='avr://, the firmware for the board in simavr, at --speed 0.4 unless '
-                        'another is given, so choose few --values; default: the simulated board')
-    parser.add_argument('--values', type=int, default=VALUES, metavar='N',
+                        help='avr://, the firmware for the board in simavr, at --speed 0.8 and '
+                        'with 4 --values unless others are given; default: the simulated board')
+    parser.add_argument('--values', type=int, metavar='N',
                         help='targets in each sequence (default: 40)')
     parser.add_argument('--effects', choices=('none', 'auto'), default='none',
                         help="none: the paper's model (default); auto: with what the bench proves")
@@ -117,6 +121,8 @@ def run(args: argparse.Namespace) -> None:
                              'without --port')
     if args.speed is None:
         args.speed = AVR_SPEED if args.port else SIMULATED_SPEED
+    if args.values is None:
+        args.values = AVR_VALUES if args.port else VALUES
     if args.port and (args.hidden or args.speed > 1.2):
         raise ParameterError(f'--port {AVR}: without --hidden, and no faster than --speed 1.2')
     if args.values < 4:
@@ -226,7 +232,7 @@ def drive(args: argparse.Namespace, folder: Path, sequences: Angles, model_file:
 
         port = f'{AVR}bicep?speed={pace.speed:g}&seed={args.seed}'
         # The chip counts from where the arm is when it is switched on.
-        own = {'encoder_zero': float(Plant(args.seed).arm.angle)}
+        own = {'encoder_zero': float(Plant(args.seed).arm.angle), **AVR_CYCLE}
     parameters = {
         'port': port, 'model_file': str(Path(model_file).resolve()), 'use_sim_time': True,
         'telemetry_rate': 2.0, 'horizon': min(5.0, 0.7 * pace.hold),

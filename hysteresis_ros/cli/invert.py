@@ -63,8 +63,8 @@ def invert(model: MuscleModel, reference: Mapping[str, np.ndarray],
     model : MuscleModel
     reference : dict of str to ndarray (rows,)
         As `read_reference` gives it: force at resting length [N], or load and length, or angle
-        [rad]; `trial` wipes the memory where it changes; `time` and `ambient_temperature` are
-        used if they are there.
+        [rad]; `trial` wipes the memory where it changes; `time`, `ambient_temperature` and
+        `supply_voltage` are used if they are there.
     method : {'preisach', 'linear'}
 
     Returns
@@ -131,10 +131,11 @@ def setpoint(controller: Controller, model: MuscleModel, reference: Mapping[str,
         length = float(reference[model.response][row])
         force = float(reference[model.load_name][row]) if model.load_name else 0.0
     time = reference.get('time')
-    ambient = reference.get('ambient_temperature')
+    ambient, supply = (float(reference[name][row]) if name in reference else float('nan')
+                       for name in ('ambient_temperature', 'supply_voltage'))
     return controller.setpoint(
-        length, force, time=None if time is None else float(time[row]),
-        ambient=float('nan') if ambient is None else float(ambient[row]))
+        length, force, time=None if time is None else float(time[row]), ambient=ambient,
+        supply=supply)
 
 
 def invert_linear(model: MuscleModel, reference: Mapping[str, np.ndarray],

@@ -19,7 +19,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     parser = subparsers.add_parser(
         'simulate', help='measurements of the virtual laboratory', description=DESCRIPTION)
     parser.add_argument('protocol', metavar='PROTOCOL',
-                        help='bench, arm-steps, arm-dynamic, ...')
+                        help='bench, arm-steps, arm-dynamic; of mckibben or scp also bench-dynamic')
     parser.add_argument('-o', '--output', type=OutputFolder, required=True, metavar='DIR')
     parser.add_argument('--effect', action='append', default=[], type=effect,
                         metavar='NAME[=STRENGTH]',

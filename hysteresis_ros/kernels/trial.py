@@ -134,18 +134,21 @@ def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor:
 
 
 @jit
-def run(arm: Arm, state: State, cold: float, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
-        factor: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+def run(arm: Arm, state: State, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray,
+        offset: np.ndarray, factor: np.ndarray
+        ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     """
-    Run a whole trial from the cold state.
+    Run whole trials, each from the cold state.
 
     Parameters
     ----------
     arm, state : Arm, State
     cold : float
         Output of the first stage in the cold state.
+    ends : ndarray of int, shape (trials,)
+        Where each trial ends and the next begins.
     x, dt, offset, factor : ndarray, shape (rows,)
-        As for `step`.
+        As for `step`, for the rows of all trials.
 
     Returns
     -------
@@ -157,10 +160,13 @@ def run(arm: Arm, state: State, cold: float, x: np.ndarray, dt: np.ndarray, offs
     """
     rows = len(x)
     angles, outputs, inputs = np.empty(rows), np.empty(rows), np.empty(rows)
-    start(arm, state)
-    rest = step(arm, state, cold, np.inf, 0.0, 1.0)
-    for n in range(rows):
-        angles[n] = step(arm, state, x[n], dt[n], offset[n], factor[n])
-        outputs[n] = output(arm, state)
-        inputs[n] = last_input(arm.wires.table, state.memories[0])
+    rest, begin = np.nan, 0
+    for end in ends:
+        start(arm, state)
+        rest = step(arm, state, cold, np.inf, 0.0, 1.0)
+        for n in range(begin, end):
+            angles[n] = step(arm, state, x[n], dt[n], offset[n], factor[n])
+            outputs[n] = output(arm, state)
+            inputs[n] = last_input(arm.wires.table, state.memories[0])
+        begin = end
     return rest, angles, outputs, inputs

@@ -33,6 +33,10 @@ def in_order(effects: Sequence[Effect]) -> list[Effect]:
                                             if effect.id in known else len(known)))
 
 
+def _of_stage(stage: str, effects: Sequence[Effect]) -> list[Any]:
+    return [effect for effect in effects if effect.stage == stage]
+
+
 class Chain:
     """
     The effects of a model by stage.
@@ -51,21 +55,28 @@ class Chain:
         self.surroundings = surroundings
         # Voltage and current heat with their square (Eq. 2).
         self.heats_by_square = surroundings.drive in ELECTRIC_DRIVES
-        drive = [effect for effect in ordered if isinstance(effect, DriveEffect)]
-        self.electrical = [effect for effect in drive if effect.stage == 'electrical']
-        self.thermal = [effect for effect in drive if effect.stage == 'thermal']
-        self.material = [e for e in ordered if isinstance(e, MaterialEffect)]
+        self.electrical: list[DriveEffect] = _of_stage('electrical', ordered)
+        self.thermal: list[DriveEffect] = _of_stage('thermal', ordered)
+        self.material: list[MaterialEffect] = _of_stage('material', ordered)
+        self.mechanism: list[MechanismEffect] = _of_stage('mechanism', ordered)
+        self.sensor: list[SensorEffect] = _of_stage('sensor', ordered)
         # Those to whose elongation time or history add.
         self.drifting = [effect for effect in self.material
                          if type(effect).drift is not MaterialEffect.drift
                          or type(effect).advance is not MaterialEffect.advance]
-        self.mechanism = [e for e in ordered if isinstance(e, MechanismEffect)]
-        self.sensor = [e for e in ordered if isinstance(e, SensorEffect)]
+        # Those that make something of the load.
+        self._shifting, self._playing = self._with('shift_load'), self._with('loop_width')
+        self._scaling, self._stretching = self._with('scale'), self._with('stretch')
         self.needs_phase = any(effect.needs_phase for effect in ordered)
         # A fan changes gain and time constant together (d1 stands in both).
         for effect in self.thermal:
             effect.speed = math.prod(other.exchange for other in self.thermal)
         self.start()
+
+    def _with(self, method: str) -> list[MaterialEffect]:
+        """Return the effects of the material that have this method of their own."""
+        neutral = getattr(MaterialEffect, method)
+        return [e for e in self.material if getattr(type(e), method) is not neutral]
 
     @property
     def offsets(self) -> tuple[float, ...]:
@@ -167,7 +178,7 @@ class Chain:
     def load_inside(self, load: Values) -> Values:
         """Return the load as the transformation feels it."""
         shifted = load + sum(
-            effect.shift_load(load, self.surroundings) for effect in self.material)
+            effect.shift_load(load, self.surroundings) for effect in self._shifting)
         share = sum(effect.follows_strain for effect in self.material)
         if share == 0.0:
             return shifted
@@ -178,32 +189,31 @@ class Chain:
     @property
     def plays(self) -> bool:
         """Whether the loop's width depends on the load."""
-        return any(type(effect).loop_width is not MaterialEffect.loop_width
-                   for effect in self.material)
+        return bool(self._playing)
 
     def loop_width(self, load: Values) -> Values:
         """Return w(F), by which the loop is wider than that of H2, at least 0."""
         return np.maximum(sum((effect.loop_width(load, self.surroundings)
-                               for effect in self.material), 0.0 * load), 0.0)
+                               for effect in self._playing), 0.0 * load), 0.0)
 
     def scale(self, load: Values) -> Values:
         """Return S(F), the factor on the transformation strain."""
-        factor = 1.0
-        for effect in self.material:
+        factor = 1.0 + 0.0 * load
+        for effect in self._scaling:
             factor = factor * effect.scale(load, self.surroundings)
         return factor
 
     def stretch(self, load: Values) -> Values:
         """Return e(F), the elongation by the load alone."""
-        return sum((effect.stretch(load, self.surroundings) for effect in self.material),
+        return sum((effect.stretch(load, self.surroundings) for effect in self._stretching),
                    0.0 * load)
 
     def compliance(self) -> float:
         """Return the elastic compliance of a wire [m per unit of u], 0 where it is not known."""
         load = self.surroundings.load or 1.0
-        stretched = self.stretch(np.float64(load)) - self.stretch(np.float64(0.0))
-        inside = self.load_inside(np.float64(load)) - self.load_inside(np.float64(0.0))
-        found = float(stretched / max(inside, 1e-3 * load))
+        loads = np.array([0.0, load])
+        stretched, inside = self.stretch(loads), self.load_inside(loads)
+        found = float((stretched[1] - stretched[0]) / max(inside[1] - inside[0], 1e-3 * load))
         return found if found >= LEAST_COMPLIANCE else 0.0
 
     def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs

@@ -198,6 +198,7 @@ class Controller:
         self._pacing.reset(cold, drive_squared)
         self._fresh = True
         self._ambient: float | None = None
+        self._supply: float | None = None
 
     def save(self) -> dict[str, Any]:
         """Return the memory as plain types, fit for JSON and YAML."""
@@ -207,7 +208,8 @@ class Controller:
                 'effects': [self._chain.save(), self._steady.save()],
                 'targets': self._targets.save() if self.model.geometry is not None else {},
                 'pacing': self._pacing.save(),
-                'fresh': self._fresh, 'arm': self._arm, 'ambient': self._ambient}
+                'fresh': self._fresh, 'arm': self._arm, 'ambient': self._ambient,
+                'supply': self._supply}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """
@@ -220,7 +222,8 @@ class Controller:
         """
         before = self.save()
         try:
-            for part in (state['targets'], {'ambient': state['ambient']}):
+            for part in (state['targets'], {'ambient': state['ambient'],
+                                            'supply': state.get('supply')}):
                 for name, value in part.items():
                     if value is not None and not math.isfinite(value):
                         raise ValueError(f'{name} is {value}')
@@ -241,7 +244,7 @@ class Controller:
             self._targets.restore(**state['targets'])
         self._pacing.restore(**state['pacing'])
         self._fresh, self._arm = bool(state['fresh']), bool(state['arm'])
-        self._ambient = state['ambient']
+        self._ambient, self._supply = state['ambient'], state.get('supply')
 
     def reference(self, theta: float) -> Reference:
         """
@@ -279,8 +282,8 @@ class Controller:
             self._rest = angle, [operator.input for operator in balance.operators]
         return self._rest
 
-    def force_setpoint(self, force: float, commit: bool = True,
-                       ambient: float = math.nan) -> Setpoint:
+    def force_setpoint(self, force: float, commit: bool = True, ambient: float = math.nan,
+                       supply: float = math.nan) -> Setpoint:
         """
         Return the drive for a force at resting length (Eq. 12).
 
@@ -292,6 +295,8 @@ class Controller:
             Whether it will be applied, so that the memory has to follow.
         ambient : float
             Ambient temperature [degC], NaN if unknown.
+        supply : float
+            Voltage of the supply [V], NaN if unknown.
 
         Returns
         -------
@@ -310,7 +315,7 @@ class Controller:
         found = self._force.invert(force)
         low, high = self._force.output_range
         phase = (high - found.output) / max(high - low, 1e-12)
-        inputs = self._inputs(0.0, phase, ambient)
+        inputs = self._inputs(0.0, phase, ambient, supply)
         drive, clipped = self._clip(self._steady.inverse(
             float(self._chain.to_drive_squared(found.input)), inputs))
         applied = float(self._chain.to_drive(self._steady.step(drive, inputs)))
@@ -324,7 +329,8 @@ class Controller:
         return Setpoint(drive, saturated, expected, expected - force, reason)
 
     def setpoint(self, length: float, force: float, time: float | None = None,
-                 commit: bool = True, ambient: float = math.nan) -> Setpoint:
+                 commit: bool = True, ambient: float = math.nan,
+                 supply: float = math.nan) -> Setpoint:
         """
         Return the drive for an elongation under a force (Eqs. 13 and 14).
 
@@ -340,6 +346,8 @@ class Controller:
             Whether it will be applied, so that the memory has to follow.
         ambient : float
             Ambient temperature [degC], NaN if unknown.
+        supply : float
+            Voltage of the supply [V], NaN if unknown.
 
         Returns
         -------
@@ -356,20 +364,20 @@ class Controller:
         if not (math.isfinite(length) and math.isfinite(force)):
             return self._no_number()
         if commit:
-            return self._setpoint(length, force, time, ambient)
+            return self._setpoint(length, force, time, ambient, supply)
         before = self.save()
-        found = self._setpoint(length, force, time, ambient)
+        found = self._setpoint(length, force, time, ambient, supply)
         self._take(before)
         return found
 
-    def _setpoint(self, length: float, force: float, time: float | None, ambient: float
-                  ) -> Setpoint:
+    def _setpoint(self, length: float, force: float, time: float | None, ambient: float,
+                  supply: float) -> Setpoint:
         self._pacing.advance(time)
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
             self._second.settle_cold(self._cold, force, self._at_rest()[1] if self._arm else None)
             self._pacing.rest(float(self.model.martensite(self._second.output)))
-        inputs = self._inputs(0.0, self._share(length, force), ambient)
+        inputs = self._inputs(0.0, self._share(length, force), ambient, supply)
         find = self._search if self._steady.drifts else self._invert
         drive, saturated = find(length, force, inputs)
         outcome = self._outcome(drive, force, inputs)
@@ -449,16 +457,18 @@ class Controller:
         self._fresh = False
         if math.isfinite(inputs.ambient):
             self._ambient = inputs.ambient
+        if math.isfinite(inputs.supply):
+            self._supply = inputs.supply
         self._pacing.begin(drive, outcome.drive_squared, inputs.phase, time)
         return self._pacing.drive
 
-    def hold(self, time: float, ambient: float = math.nan) -> float:
+    def hold(self, time: float, ambient: float = math.nan, supply: float = math.nan) -> float:
         """
         Return the drive that keeps the last reference, without touching its memory.
 
         It differs from the last setpoint's only while a lagging muscle is being overdriven, which
         ends with the first call at the horizon or after it; on the way that the rate limit makes
-        longer; and where the ambient temperature has changed.
+        longer; and where the ambient temperature or the supply has changed.
 
         Parameters
         ----------
@@ -466,22 +476,31 @@ class Controller:
             Now [s].
         ambient : float
             Ambient temperature [degC], NaN if unknown: then that of before counts.
+        supply : float
+            Voltage of the supply [V], likewise.
         """
         if self._fresh:
             self._pacing.advance(time)
             return self._pacing.drive
         steady = None
-        if math.isfinite(ambient) and ambient != self._ambient:
+        known = self._ambient, self._supply
+        if math.isfinite(ambient):
             self._ambient = ambient
+        if math.isfinite(supply):
+            self._supply = supply
+        if (self._ambient, self._supply) != known:
             steady = self._clip(self._steady.inverse(
                 self._pacing.drive_squared, self._inputs(0.0, self._pacing.phase)))[0]
         self._pacing.hold(time, steady)
         return self._pacing.drive
 
-    def _inputs(self, dt: float, phase: float, ambient: float = math.nan) -> Inputs:
+    def _inputs(self, dt: float, phase: float, ambient: float = math.nan,
+                supply: float = math.nan) -> Inputs:
         if not math.isfinite(ambient) and self._ambient is not None:
             ambient = self._ambient
-        return Inputs(0.0, 0.0, dt, ambient, phase, 0.0)
+        if not math.isfinite(supply) and self._supply is not None:
+            supply = self._supply
+        return Inputs(0.0, 0.0, dt, ambient, phase, 0.0, supply)
 
     def _worn(self, inputs: Inputs, drive: float) -> Inputs:
         """Return the inputs with the cycles that there will be after `drive`."""

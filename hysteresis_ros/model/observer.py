@@ -60,7 +60,8 @@ class Observer:
         self._time = time
         self._drive = self.model.cold_drive
 
-    def step(self, time: float, drive: float, ambient: float = math.nan) -> float:
+    def step(self, time: float, drive: float, ambient: float = math.nan,
+             supply: float = math.nan) -> float:
         """
         Advance to the next sample.
 
@@ -73,6 +74,8 @@ class Observer:
             before.
         ambient : float
             Ambient temperature [degC], NaN if unknown.
+        supply : float
+            Voltage of the supply [V], NaN if unknown, or if `drive` is what was applied.
 
         Returns
         -------
@@ -88,7 +91,7 @@ class Observer:
         self._travel += abs(drive - self._drive)
         self._time, self._drive = time, drive
         inputs = Inputs(time, time, dt, ambient, math.nan,
-                        self._travel / (2.0 * self.model.drive_range))
+                        self._travel / (2.0 * self.model.drive_range), supply)
         angle = self._arm.step(drive, inputs)
         for effect in self._chain.sensor:
             angle = effect.step(angle, dt)

@@ -37,6 +37,9 @@ FIT_AGREEMENT, FIT_PASSES, MOVING_FIT_PASSES = 2e-3, 10, 4
 # Where all rows count in a fit, an arm at rest is balanced after each change of x by this share of
 # H2's range, and in between is interpolated.
 SPACING = 0.01
+# Rows from which on threads pay: a simulation takes half a ms in the interpreter, which only one of
+# them has at a time, and about 1 us a row outside.
+WORTH_THREADS = 1000
 # Balances that are kept, each with a table of some thousand numbers.
 MOST_BALANCES = 64
 
@@ -87,10 +90,10 @@ def trials_of(model: MuscleModel, measurement: Measurement) -> list[Trial]:
         If the table lacks the model's drive.
     """
     drive = measurement.column(model.drive)
-    load = (measurement.columns.get(model.load_name) if model.load_name else None)
-    if load is None:
-        load = np.zeros(measurement.rows)
-    ambient = measurement.columns.get('ambient_temperature')
+    known = (measurement.columns.get(model.load_name) if model.load_name else None)
+    load = np.zeros(measurement.rows) if known is None else known
+    ambient, supply = (measurement.columns.get(name, np.full(measurement.rows, np.nan))
+                       for name in ('ambient_temperature', 'supply_voltage'))
     low, high = model.ranges.get(model.drive, (0.0, 1.0))
     trials, clock, travel = [], 0.0, 0.0
     for _, rows in measurement.split():
@@ -107,8 +110,9 @@ def trials_of(model: MuscleModel, measurement: Measurement) -> list[Trial]:
         travelled = travel + np.cumsum(np.abs(np.diff(values, prepend=model.cold_drive)))
         inputs = Inputs(
             time=time, clock=clock + time, dt=dt,
-            ambient=ambient[rows] if ambient is not None else np.full(count, np.nan),
-            phase=np.full(count, np.nan), cycles=travelled / (2.0 * max(high - low, 1e-12)))
+            ambient=ambient[rows], phase=np.full(count, np.nan),
+            cycles=travelled / (2.0 * max(high - low, 1e-12)), supply=supply[rows],
+            load=load[rows] if known is not None else np.full(count, np.nan))
         trials.append(Trial(rows, values, load[rows], inputs))
         clock += float(time[-1])
         travel = float(travelled[-1])
@@ -190,15 +194,18 @@ class Simulator:
         phase = None
         if chain.needs_phase:
             known = self._phases.get(tuple(effect.id for effect in effects), self._latest)
-            phase = np.ones_like(known) if exact else known.copy()
-        for trial in self.trials:
-            if phase is not None:
-                response, phase[trial.rows], agrees = self._agree(
-                    respond, trial, phase[trial.rows], *self._patience(chain.moves, exact))
-                if exact and not agrees and self.measurement.response == 'angle':
-                    response = self._row_by_row(chain, trial)
-            else:
-                response = respond(trial, trial.inputs)
+            found = self._agree(respond, np.ones_like(known) if exact else known,
+                                *self._patience(chain.moves, exact))
+            phase = known.copy()
+            for one in found:
+                phase[one.trial.rows] = one.phase
+            responses = [
+                self._row_by_row(chain, one.trial)
+                if exact and not one.agrees and self.measurement.response == 'angle'
+                else one.response for one in found]
+        else:
+            responses = respond(self.trials)
+        for trial, response in zip(self.trials, responses):
             result[trial.rows] = chain.measured(response.values, trial.inputs, response.rest)
             if inputs_of_stage is not None and response.inputs is not None:
                 inputs_of_stage.append(response.inputs)
@@ -225,7 +232,7 @@ class Simulator:
         ParameterError, ModelFileError
             As `run`.
         """
-        if jobs > 1 and len(sets) > 1:
+        if jobs > 1 and len(sets) > 1 and self.measurement.rows >= WORTH_THREADS:
             with ThreadPoolExecutor(min(jobs, len(sets))) as pool:
                 found = list(pool.map(self._run, sets))
         else:
@@ -242,27 +249,18 @@ class Simulator:
             return MOVING_PASSES if moves else PASSES, AGREEMENT
         return MOVING_FIT_PASSES if moves else FIT_PASSES, FIT_AGREEMENT
 
-    def _agree(self, respond: Callable, trial: Trial, phase: np.ndarray, passes: int,
-               agreement: float) -> tuple[Response, np.ndarray, bool]:
-        """
-        Return the response with the phase that it has itself, this phase, and whether they agree.
-
-        Begins with the phase given (rows,); never one pass alone, whose response would be that of
-        the phase given.
-        """
-        phases: list[np.ndarray] = []
-        residuals: list[np.ndarray] = []
+    def _agree(self, respond: Callable, phase: np.ndarray, passes: int, agreement: float
+               ) -> list[_Agreement]:
+        """Return each trial with the phase that it has itself, begun with a phase (rows,)."""
+        found = [_Agreement(trial, phase[trial.rows], agreement) for trial in self.trials]
+        searching = found
         for _ in range(passes):
-            response = respond(trial, trial.inputs._replace(phase=phase))
-            residual = self._phase(response.output) - phase
-            if phases and np.sqrt(np.mean(residual ** 2)) < agreement:
-                return response, phase, True
-            if not np.all(np.isfinite(residual)):
+            for one, response in zip(searching, respond([one.driven() for one in searching])):
+                one.take(response, self._phase(response.output))
+            searching = [one for one in searching if one.searching]
+            if not searching:
                 break
-            phases.append(phase)
-            residuals.append(residual)
-            phase = np.clip(_next_phase(phases[-LOOK_BACK:], residuals[-LOOK_BACK:]), 0.0, 1.0)
-        return response, phase, False
+        return found
 
     def _row_by_row(self, chain: Chain, trial: Trial) -> Response:
         """Return the response of an arm whose phase is found in each row before the next."""
@@ -284,22 +282,23 @@ class Simulator:
             return np.clip((high - given) / max(high - low, 1e-12), 0.0, 1.0)
         return self.model.martensite(given)
 
-    def _responder(self, chain: Chain, exact: bool = False) -> Callable[[Trial, Inputs], Response]:
-        """Return what gives the response of a trial."""
+    def _responder(self, chain: Chain, exact: bool = False
+                   ) -> Callable[[Sequence[Trial]], list[Response]]:
+        """Return what gives the responses of trials."""
         response = self.measurement.response
         if response == 'force':
             if self.model.force_stage is None:
                 raise ParameterError(
                     'the model has no force stage; identify it with --force F.csv')
             operator = copy.deepcopy(self.model.force_stage)
-            return lambda trial, inputs: self._force(chain, operator, trial, inputs)
+            return lambda trials: [self._force(chain, operator, trial) for trial in trials]
         first = self.model.first_stage(chain)
         if response == 'angle':
             balance = self._balance(chain)
             asked = None if exact or chain.moves else self._asked
-            return lambda trial, inputs: self._angle(chain, first, balance, asked, trial, inputs)
+            return lambda trials: self._angles(chain, first, balance, asked, trials)
         stage = self.model.require_length_stage()
-        return lambda trial, inputs: self._length(chain, first, stage, trial, inputs)
+        return lambda trials: [self._length(chain, first, stage, trial) for trial in trials]
 
     def _balance(self, chain: Chain) -> ArmBalance:
         """Return the balance of an arm; most sets of effects differ in what it does not see."""
@@ -314,27 +313,26 @@ class Simulator:
         # Each thread has a state of its own.
         return made.copy()
 
-    def _first(self, chain: Chain, first: FirstStage, trial: Trial, inputs: Inputs
+    def _first(self, chain: Chain, first: FirstStage, trial: Trial
                ) -> tuple[float, np.ndarray, np.ndarray]:
         """Return x in the cold state, and x and drive squared of each row."""
-        drive_squared = chain.drive_squared(trial.drive, inputs)
+        drive_squared = chain.drive_squared(trial.drive, trial.inputs)
         cold = chain.to_drive_squared(self.model.cold_drive)
         first.reset()
         x = first.simulate(np.concatenate(([cold], drive_squared)))
         return float(x[0]), x[1:], drive_squared
 
-    def _force(self, chain: Chain, operator: HysteresisOperator, trial: Trial, inputs: Inputs
-               ) -> Response:
-        drive = chain.to_drive(chain.drive_squared(trial.drive, inputs))
+    def _force(self, chain: Chain, operator: HysteresisOperator, trial: Trial) -> Response:
+        drive = chain.to_drive(chain.drive_squared(trial.drive, trial.inputs))
         operator.reset()
         operator.step(self.model.cold_drive)
         force = operator.simulate(drive)
         return Response(force, force)
 
-    def _length(self, chain: Chain, first: FirstStage, stage: HysteresisOperator, trial: Trial,
-                inputs: Inputs) -> Response:
+    def _length(self, chain: Chain, first: FirstStage, stage: HysteresisOperator, trial: Trial
+                ) -> Response:
         model = self.model
-        cold, x, drive_squared = self._first(chain, first, trial, inputs)
+        cold, x, drive_squared = self._first(chain, first, trial)
         load = chain.load_inside(trial.load) if first.loaded else 0.0 * trial.load
         given = model.sign * (np.concatenate(([cold], x)) - np.concatenate((load[:1], load)))
         if chain.plays and first.loaded:
@@ -344,25 +342,71 @@ class Simulator:
         stage.step(given[0])
         output = stage.simulate(given[1:])
         base = stage.output_range[0]
-        offset, factor = chain.drift(trial.drive, drive_squared, inputs)
+        offset, factor = chain.drift(trial.drive, drive_squared, trial.inputs)
         return Response(base + chain.scale(trial.load) * factor * (output - base)
                         + chain.stretch(trial.load) + offset, output)
 
-    def _angle(self, chain: Chain, first: FirstStage, balance: ArmBalance,
-               asked: np.ndarray | None, trial: Trial, inputs: Inputs) -> Response:
-        cold, x, drive_squared = self._first(chain, first, trial, inputs)
-        offset, factor = (np.broadcast_to(np.asarray(column, dtype=float), x.shape)
-                          for column in chain.drift(trial.drive, drive_squared, inputs))
-        if asked is None:
-            rest, angles, outputs, stage_inputs = balance.run(cold, x, inputs.dt, offset, factor)
-            return Response(angles, outputs, stage_inputs, rest)
+    def _angles(self, chain: Chain, first: FirstStage, balance: ArmBalance,
+                asked: np.ndarray | None, trials: Sequence[Trial]) -> list[Response]:
+        """Return what the arm does; the trials run in one call of the kernel."""
         # The phase is looked at in all rows.
         spacing = SPACING * balance.span if chain.needs_phase else np.inf
-        kept = balanced_rows(np.array([x, offset, factor]),
-                             chain.rows_read(asked[trial.rows], inputs), spacing)
-        rest, *columns = balance.run(cold, x[kept], inputs.dt[kept], offset[kept], factor[kept])
-        angles, outputs, stage_inputs = (between(kept, x, column) for column in columns)
-        return Response(angles, outputs, stage_inputs, rest)
+        cold, columns, rows = 0.0, [], []
+        for trial in trials:
+            cold, x, drive_squared = self._first(chain, first, trial)
+            columns.append(np.array([
+                x, *chain.drift(trial.drive, drive_squared, trial.inputs), trial.inputs.dt]))
+            if asked is not None:
+                rows.append(balanced_rows(
+                    columns[-1][:3], chain.rows_read(asked[trial.rows], trial.inputs), spacing))
+        kept = [own[:, one] for own, one in zip(columns, rows)] if rows else columns
+        ends = np.cumsum([own.shape[1] for own in kept])
+        x, offset, factor, dt = np.concatenate(kept, axis=1)
+        rest, *found = balance.run(cold, ends, x, dt, offset, factor)
+        responses = []
+        for place, end in enumerate(ends):
+            angles, outputs, inputs = (
+                column[end - kept[place].shape[1]:end] for column in found)
+            if rows:
+                angles, outputs, inputs = (between(rows[place], columns[place][0], column)
+                                           for column in (angles, outputs, inputs))
+            responses.append(Response(angles, outputs, inputs, rest))
+        return responses
+
+
+class _Agreement:
+    """
+    The phase of one trial on its way to the one that the response to it has.
+
+    Never after one pass alone, whose response would be that of the phase given.
+    """
+
+    response: Response
+
+    def __init__(self, trial: Trial, phase: np.ndarray, agreement: float) -> None:
+        self.trial, self.phase = trial, phase
+        self.searching, self.agrees = True, False
+        self._agreement = agreement
+        self._phases: list[np.ndarray] = []
+        self._residuals: list[np.ndarray] = []
+
+    def driven(self) -> Trial:
+        """Return the trial with the phase to try."""
+        return dataclasses.replace(
+            self.trial, inputs=self.trial.inputs._replace(phase=self.phase))
+
+    def take(self, response: Response, caused: np.ndarray) -> None:
+        """Take the response to the phase, and the phase (rows,) that it has."""
+        self.response, residual = response, caused - self.phase
+        if self._phases and np.sqrt(np.mean(residual ** 2)) < self._agreement:
+            self.searching, self.agrees = False, True
+        elif not np.all(np.isfinite(residual)):
+            self.searching = False
+        else:
+            self._phases.append(self.phase)
+            self._residuals.append(residual)
+            self.phase = np.clip(_next_phase(
+                self._phases[-LOOK_BACK:], self._residuals[-LOOK_BACK:]), 0.0, 1.0)
 
 
 def _next_phase(phases: Sequence[np.ndarray], residuals: Sequence[np.ndarray]) -> np.ndarray:

@@ -102,18 +102,18 @@ class CompiledOperator(HysteresisOperator):
         """Go back to a memory that `snapshot` returned."""
         self.memory[:len(snapshot)] = snapshot
 
-    def move_memory(self, memory: np.ndarray) -> None:
-        """Keep what is remembered in another array from now on, shape (Q,)."""
+    def with_memory(self, memory: np.ndarray) -> 'CompiledOperator':
+        """Return a copy that remembers the same in an array of its own, shape (Q,)."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
         used = self._used()
         memory[:used] = self.memory[:used]
-        self.memory = memory
+        other.memory = memory
+        return other
 
     def __deepcopy__(self, memo: dict) -> 'CompiledOperator':
         """Return an operator with a memory of its own; what never changes is shared."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__)
-        other.move_memory(np.empty(len(self.memory)))
-        return other
+        return self.with_memory(np.empty(len(self.memory)))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what to hand to another process: of the memory only what means something."""
