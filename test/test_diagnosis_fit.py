@@ -231,6 +231,25 @@ def test_fits_are_the_same_whatever_the_jobs(model):
         assert np.array_equal(one, two)
 
 
+def test_a_set_that_was_simulated_before_is_not_simulated_again(model, monkeypatch):
+    """But where the phase is sought, which begins with that of the run before."""
+    fitter = fitter_of(model, noisy(model))
+    simulator, = fitter.problem.simulators
+    run_many, simulated = simulator.run_many, []
+
+    def count(sets, jobs):
+        simulated.extend(effect.id for effects in sets for effect in effects)
+        return run_many(sets, jobs)
+
+    monkeypatch.setattr(simulator, 'run_many', count)
+    sets = [[effect_of(model, 'payload_error', dm=15.0)], [effect_of(model, 'resistance_change')]]
+    first = fitter.simulate(sets)
+    again = fitter.simulate([[effect_of(model, 'payload_error', dm=20.0)], *sets])
+    assert simulated == ['payload_error', 'resistance_change'] * 2
+    np.testing.assert_array_equal(again[1], first[0])
+    assert np.ptp(again[:, -1]) > 0.0 and not np.array_equal(again[0], again[1])
+
+
 def test_no_effects_are_a_fit_too(loaded):
     """The base model, with an evidence that the planted effect exceeds by far."""
     point = loaded.covariance.points[0]

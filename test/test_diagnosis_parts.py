@@ -10,6 +10,7 @@ import pytest
 
 from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.residual import predictable, shares, unexplained_signal
 from hysteresis_ros.diagnosis.settings import Settings
@@ -17,6 +18,7 @@ from hysteresis_ros.diagnosis.significance import (
     block_sums, cosines, gain_interval, paired_p_values, residualise)
 from hysteresis_ros.diagnosis.verdict import add_signatures, in_order, next_experiment
 from hysteresis_ros.errors import MeasurementError
+from hysteresis_ros.kernels.formation import formed
 from hysteresis_ros.measurements import Measurement
 
 
@@ -133,11 +135,25 @@ def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
     """In the angle it is the error of the length times the arm's sensitivity, and the path's."""
     gain = discrepancy.sensitivity(problem, [])
     predicted = problem.simulate([])
-    path = discrepancy.path_difference(problem, [])
+    history = load_history(problem, [])
     found = discrepancy.discrepancy_along(problem, [], predicted, Settings()).matrix()
-    assert np.diag(found) == pytest.approx((0.0004 * gain) ** 2 + path ** 2)
+    assert np.diag(found) == pytest.approx(
+        (0.0004 * gain) ** 2 + history.path ** 2 + (gain * history.formation) ** 2)
     assert found == pytest.approx(found.T)
     assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
+
+
+def test_what_martensite_may_keep_of_its_load_is_part_of_the_discrepancy():
+    """As an error of the length, where the strain grows with a load that moves."""
+    model = bicep_model()
+    growth = effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)
+    problem = problem_for(model.with_effects([growth]), [runs(model)])
+    gain, history = discrepancy.sensitivity(problem, [growth]), load_history(problem, [growth])
+    kept = (gain * history.formation) ** 2
+    found = np.diag(discrepancy.discrepancy_along(
+        problem, [growth], problem.simulate([growth]), Settings()).matrix())
+    assert np.mean(kept) > 0.01 * np.mean(found)
+    assert found == pytest.approx((0.0004 * gain) ** 2 + history.path ** 2 + kept)
 
 
 def test_errors_of_rows_that_are_near_in_drive_and_response_are_alike(problem):
@@ -181,7 +197,7 @@ def test_the_largest_error_that_the_bench_has_shown_counts():
 
 def path_of(model, measured):
     """Return the difference between a load that moves and one that acted all along."""
-    return discrepancy.path_difference(problem_for(model, [measured]), [])
+    return load_history(problem_for(model, [measured]), []).path
 
 
 @pytest.mark.parametrize('voltage', [0.0, 2.0, 4.0, 6.0])
@@ -205,14 +221,46 @@ def test_a_load_that_moves_with_the_arm_leaves_a_difference():
     assert np.abs(path_of(light, arm_run(both_ways))).max() < 0.02 * path.max()
 
 
+@pytest.mark.parametrize('g', [0.4, -0.5])
+def test_loops_that_the_load_widens_are_part_of_both_models(g):
+    """Else the difference would be that of other loops, seven times as large."""
+    model = bicep_model()
+    slopes = effect_of(model, 'transformation_slopes', g=g)
+    both_ways = arm_run(np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)]))
+    plain = np.abs(path_of(model, both_ways)).max()
+    problem = problem_for(model.with_effects([slopes]), [both_ways])
+    assert np.abs(load_history(problem, [slopes]).path).max() == pytest.approx(plain, rel=0.3)
+
+
+def test_martensite_keeps_the_strain_with_which_it_formed():
+    """Formed in thirds under loads of 1, 2 and 3, it goes back with the mean strain of these."""
+    outputs = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.5, 0.0, 1.0])
+    scales = np.array([1.0, 1.0, 2.0, 3.0, 9.0, 9.0, 9.0, 1.0])
+    np.testing.assert_allclose(formed(outputs, scales), [0.0, 1.0, 3.0, 6.0, 6.0, 3.0, 0.0, 1.0])
+
+
+def test_where_the_strain_does_not_grow_with_the_load_nothing_is_kept():
+    """Nor where the load holds still: the bench shows all that there is."""
+    model = bicep_model()
+    growth = effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)
+    moving = arm_run(np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)]))
+    still = arm_run(np.full(20, 4.0))
+    grown = model.with_effects([growth])
+    assert np.abs(load_history(problem_for(model, [moving]), []).formation).max() == 0.0
+    kept = np.abs(load_history(problem_for(grown, [moving]), [growth]).formation).max()
+    assert kept > 1e-5
+    assert np.abs(load_history(
+        problem_for(grown, [still]), [growth]).formation).max() < 0.02 * kept
+
+
 def test_what_the_sensor_adds_is_no_way_of_the_arm():
     """The same arm takes the same way, whatever its encoder says."""
     model = bicep_model()
     problem = problem_for(model, [arm_run(np.linspace(0.0, 6.0, 20))])
-    clean = discrepancy.path_difference(problem, [])
+    clean = load_history(problem, []).path
     offset = effect_of(model, 'encoder_offset', offset=5.0)
     assert np.abs(clean).max() > 1e-3
-    np.testing.assert_array_equal(discrepancy.path_difference(problem, [offset]), clean)
+    np.testing.assert_array_equal(load_history(problem, [offset]).path, clean)
 
 
 @pytest.mark.parametrize('verdict, names, alternatives, unobservable, words', [

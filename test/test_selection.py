@@ -178,33 +178,35 @@ def test_what_suffices_alone_grows_alone(payload, monkeypatch):
     assert payload._worth_growing(2) == payload._ranked_of(2)
 
 
-def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
-    """A fan is a sag to an arm at rest; in its place the sag itself is found."""
+PLANTED = frozenset(['payload_error', 'supply_sag'])
+
+
+def without_the_planted_pair():
+    """Return a selection that has not found what is there, and the log evidence of that."""
     model = bicep_model(metrics={'length': {'verification': {'rmse': 0.0001}}})
-    planted = frozenset(['payload_error', 'supply_sag'])
     found = selection(model, recording(model, [
         effect_of(model, 'payload_error', dm=-15.0), effect_of(model, 'supply_sag', Rs=0.8)]),
         [*TRIED, 'airflow'])
-    before = found.fits.pop(planted).log_evidence
+    return found, found.fits.pop(PLANTED).log_evidence
+
+
+def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
+    """A fan is a sag to an arm at rest; in its place the sag itself is found."""
+    found, before = without_the_planted_pair()
     assert found.valid()[0] == {'airflow', 'payload_error'}
     found._exchange()
-    assert found.fits[planted].log_evidence == pytest.approx(before, abs=1.0)
+    assert found.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
 
 
 def test_what_is_not_physical_is_exchanged_for_what_it_stands_for(monkeypatch):
     """A fan that would have to blow harder than any does is the sag."""
-    model = bicep_model(metrics={'length': {'verification': {'rmse': 0.0001}}})
-    planted = frozenset(['payload_error', 'supply_sag'])
-    found = selection(model, recording(model, [
-        effect_of(model, 'payload_error', dm=-15.0), effect_of(model, 'supply_sag', Rs=0.8)]),
-        [*TRIED, 'airflow'])
-    before = found.fits.pop(planted).log_evidence
+    found, before = without_the_planted_pair()
     monkeypatch.setattr(Fit, 'implausible',
                         lambda fit: ['airflow.beta'] if 'airflow' in fit.names else [])
     assert found._to_exchange() == ({'airflow', 'payload_error'}, ['airflow'])
     found._exchange()
-    assert found.fits[planted].log_evidence == pytest.approx(before, abs=1.0)
-    assert found.valid()[0] == planted
+    assert found.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
+    assert found.valid()[0] == PLANTED
 
 
 def test_an_effect_has_to_matter_by_a_practical_size(model):

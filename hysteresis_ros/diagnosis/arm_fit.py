@@ -305,8 +305,9 @@ class Fitter:
             best = dataclasses.replace(fit, judged=len(self.covariance.points))
             points = self._points_of(fit.covariance, fit.judged)
         for point in points:
-            residual = point.whiten(self.problem.measured - fit.predicted)
-            jacobian = point.whiten(fit.jacobian) if len(fit.vector) else fit.jacobian
+            whitened = point.whiten(np.column_stack([
+                self.problem.measured - fit.predicted, fit.jacobian]))
+            residual, jacobian = whitened[:, 0], whitened[:, 1:]
             matrix = jacobian.T @ jacobian + np.diag(spread ** -2.0)
             evidence = (float(point.log_density(residual)) + prior
                         - 0.5 * float(np.linalg.slogdet(matrix)[1]))

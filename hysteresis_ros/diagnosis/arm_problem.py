@@ -21,13 +21,22 @@ from hysteresis_ros.identification.operators import preisach_rows
 from hysteresis_ros.operators import Preisach
 
 if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
     from hysteresis_ros.model import MuscleModel
+
+
+# Responses that are kept: a fit often begins where another one was.
+MOST_KEPT = 4000
 
 
 class ArmProblem(Problem):
     """Arm runs, simulated with the frozen weights of the bench."""
 
     refits: Literal[False] = False
+
+    def __init__(self, model: MuscleModel, measurements: Sequence[Measurement]) -> None:
+        super().__init__(model, measurements)
+        self._known: dict[tuple, np.ndarray] = {}
 
     def simulate(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> np.ndarray:
         """
@@ -55,6 +64,21 @@ class ArmProblem(Problem):
         -------
         ndarray, shape (len(sets), n)
         """
+        keys = [tuple((effect.id, *effect.values.values()) for effect in effects)
+                for effects in sets]
+        new = [index for index, key in enumerate(keys) if key not in self._known]
+        found = dict(zip(new, self._simulate_new([sets[index] for index in new])))
+        responses = [found[index] if index in found else self._known[key]
+                     for index, key in enumerate(keys)]
+        if len(self._known) > MOST_KEPT:
+            self._known.clear()
+        for index in new:
+            # A phase is sought from that of the run before, so that these differ a little.
+            if not any(effect.needs_phase for effect in sets[index]):
+                self._known[keys[index]] = found[index]
+        return np.array(responses).reshape(len(sets), len(self.measured))
+
+    def _simulate_new(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
         jobs = self.jobs if self.jobs > 0 else os.cpu_count() or 1
         runs = [simulator.run_many(sets, jobs)[:, rows]
                 for simulator, rows in zip(self.simulators, self.chosen)]

@@ -71,9 +71,15 @@ class Response:
             start, self.parameters.lower, self.parameters.upper, evaluations, tolerance)
 
     def fit(self, vector: np.ndarray) -> Fit:
-        """Return the effects with the values of a vector (k,), and what they predict."""
-        return Fit(self.parameters.with_vector(vector), vector, self.predicted(vector),
-                   self.jacobian(vector))
+        """
+        Return the effects with the values of a vector (k,), and what they predict.
+
+        A form that comes out neutral is the simplest one and stays so: it is no longer free.
+        """
+        effects = self.parameters.with_vector(vector)
+        free = ParameterVector(effects, self.problem.kind).entries
+        kept = [entry in free for entry in self.parameters.entries]
+        return Fit(effects, vector[kept], self.predicted(vector), self.jacobian(vector)[:, kept])
 
     def predicted(self, vector: np.ndarray) -> np.ndarray:
         """Return the response of all rows, shape (n,)."""

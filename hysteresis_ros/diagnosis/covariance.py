@@ -185,7 +185,7 @@ class Covariance:
         for values in several:
             discrepancy, drift, white = self._parts(values, matrix)
             total = discrepancy + drift
-            total[np.diag_indices_from(total)] += white
+            total.flat[::len(total) + 1] += white
             factor = linalg.cholesky(total, lower=True, check_finite=False)
             constant = (self._prior(values)[0] - float(np.sum(np.log(np.diag(factor))))
                         - 0.5 * len(total) * np.log(2.0 * np.pi))
@@ -260,7 +260,7 @@ class Covariance:
         """Return minus the log posterior density of values (4,), and its gradient."""
         discrepancy, drift, white = self._parts(values, matrix)
         total = discrepancy + drift
-        total[np.diag_indices_from(total)] += white
+        total.flat[::len(total) + 1] += white
         try:
             factor = linalg.cho_factor(total, lower=True, check_finite=False)
         except linalg.LinAlgError:

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.problem import Problem
     from hysteresis_ros.model import MuscleModel
 
-# A recorded temperature [degC] that changes by less is a constant with noise on it.
-SMALLEST_CHANGE = 0.5
-
 
 def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
     """
@@ -31,12 +28,14 @@ def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
     Returns
     -------
     list of str, dict of str to str
-        Identifiers to try; identifiers of unobservable effects with the reason.
+        Identifiers to try; identifiers of unobservable effects with the reason, last those that
+        need a column.
     """
     surroundings = problem.model.surroundings
     taken = {effect.id for effect in problem.model.effects if not may_differ(problem, effect)}
     names: list[str] = []
     unobservable: dict[str, str] = {}
+    unrecorded: dict[str, str] = {}
     for name, effect in catalogue().items():
         if name in taken or problem.kind not in effect.kinds:
             continue
@@ -44,16 +43,18 @@ def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
             continue
         if not effect.available(surroundings):
             continue
+        if problem.catalogue is None and effect.doubtful(surroundings):
+            continue
         column = effect.needs_column
         if effect.needs_transients and problem.settled:
             unobservable[name] = 'every row is settled'
         elif column and not any(
-                np.ptp(m.columns[column]) > SMALLEST_CHANGE if column in m.columns else False
+                np.ptp(m.columns[column]) > effect.smallest_change if column in m.columns else False
                 for m in problem.measurements):
-            unobservable[name] = f'{column} was not recorded or did not change'
+            unrecorded[name] = f'{column} was not recorded or did not change'
         else:
             names.append(name)
-    return names, unobservable
+    return names, {**unobservable, **unrecorded}
 
 
 def present(model: MuscleModel, kind: type[Effect]) -> Effect:

@@ -59,7 +59,7 @@ DIAGNOSIS = (
          read_only=True),
     Spec('diagnosis_window', 1800.0, 'Time that is judged at most, though at least 20 holds are',
          's', 60.0, 86400.0, read_only=True),
-    Spec('diagnosis_share', 0.08, 'Share of a core that diagnoses may take on average', '', 0.001,
+    Spec('diagnosis_share', 0.05, 'Share of a core that diagnoses may take on average', '', 0.001,
          1.0, read_only=True),
     Spec('settled_time', 20.0, 'Time that the voltage has to be held until the arm is settled',
          's', 20.0, 3600.0, read_only=True),

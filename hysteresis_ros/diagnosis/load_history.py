@@ -1,0 +1,166 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a load that moves while the muscle transforms does, and a bench of constant loads cannot tell.
+
+Models that agree on every table with constant loads differ on an arm:
+
+* The load acts inside the operator and leaves its mark in the memory, which is the model here; or
+  the muscle is at each moment as if its present load had acted all along.
+* The strain of the transformation is that of the present load, which is the model here (Brinson,
+  J. Intell. Mater. Syst. Struct. 4 (1993) 229, for detwinned martensite); or martensite keeps the
+  strain of the load under which it formed until it is heated (Lagoudas and others, Int. J.
+  Plasticity 32-33 (2012) 155).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hysteresis_ros.effects import Effect, Statics
+from hysteresis_ros.kernels.formation import formed
+from hysteresis_ros.kernels.load_play import follow
+from hysteresis_ros.model.chain import Chain
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+    from hysteresis_ros.model import MuscleModel
+    from hysteresis_ros.operators import HysteresisOperator
+
+# Constant loads between which the response is interpolated, and angles of the balance.
+LOADS, ANGLES = 12, 400
+
+
+@dataclasses.dataclass(frozen=True)
+class LoadHistory:
+    """
+    Differences between models that agree on every table with constant loads.
+
+    Attributes
+    ----------
+    path : ndarray, shape (n,)
+        What the angle would differ if the present load had acted all along [rad].
+    formation : ndarray, shape (n,)
+        What the length would differ if martensite kept the strain with which it formed [m].
+    """
+
+    path: np.ndarray
+    formation: np.ndarray
+
+
+def load_history(problem: ArmProblem, effects: Sequence[Effect]) -> LoadHistory:
+    """
+    Return what other models that agree on the bench would make of an arm's way.
+
+    Parameters
+    ----------
+    problem : ArmProblem
+        Rows and model.
+    effects : sequence of Effect
+        Effects of the model, which say where the arm goes.
+
+    Returns
+    -------
+    LoadHistory
+
+    Raises
+    ------
+    ParameterError
+        If the model has no geometry.
+    """
+    # What the sensor adds is no way of the arm; what depends on the phase would need it, and
+    # changes little of what the load does.
+    effects = [effect for effect in effects
+               if effect.stage != 'sensor' and not effect.needs_phase]
+    return LoadHistory(*map(np.concatenate, zip(*_ways(problem, effects))))
+
+
+def _ways(problem: ArmProblem, effects: Sequence[Effect]
+          ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Give both differences in the rows that are judged, trial by trial."""
+    model = problem.model
+    chain = Chain(effects, model.surroundings)
+    first, stage = model.first_stage(chain), model.require_length_stage()
+    arm = _Statics(model, chain)
+    for simulator, rows in zip(problem.simulators, problem.chosen):
+        angle = simulator.run(effects)
+        loads = arm.loads_between(np.min(angle), np.max(angle))
+        for trial in simulator.trials:
+            judged = rows[(rows >= trial.rows.start) & (rows < trial.rows.stop)] - trial.rows.start
+            drive_squared = chain.drive_squared(trial.drive, trial.inputs)
+            first.reset()
+            cold = chain.to_drive_squared(model.cold_drive)
+            x = first.simulate(np.concatenate(([cold], drive_squared)))
+            felt, width, scale = (_from_cold(np.interp(angle[trial.rows], arm.theta, values))
+                                  for values in (arm.load, arm.width, arm.scale))
+            if not first.loaded:
+                felt, width = 0.0 * felt, 0.0 * width
+            moving = _held(stage, model.sign * (x - felt), width)
+            path = np.zeros(len(judged))
+            if first.loaded:
+                still = np.stack([
+                    _held(stage, model.sign * (x - load), np.full(len(x), arm.width_at(load)))
+                    for load in loads])
+                path = (arm.angle(loads, still[:, 1:][:, judged])
+                        - arm.angle(loads, moving[None, 1:][:, judged]))
+            yield path, (formed(moving, scale) - scale * moving)[1:][judged]
+
+
+class _Statics:
+    """The arm at rest, angle by angle."""
+
+    def __init__(self, model: MuscleModel, chain: Chain) -> None:
+        geometry = model.require_geometry()
+        self.theta = np.linspace(*geometry.angle_range, ANGLES)
+        statics = Statics.of(geometry, self.theta)
+        for effect in chain.mechanism:
+            statics = effect.forward(statics, geometry)
+        force = np.maximum(statics.moment, 0.0) / (
+            geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6))
+        # What H2 feels, by how much its loop is wider, and the factor on the strain.
+        self.load = chain.load_inside(force)
+        self.width, self.scale = chain.loop_width(force), chain.scale(force)
+        base = model.require_length_stage().output_range[0]
+        self._demand = np.maximum.accumulate(
+            (statics.length - base - chain.stretch(force)) / self.scale)
+        self._by_load = np.argsort(self.load, kind='stable')
+
+    def loads_between(self, low: float, high: float) -> np.ndarray:
+        """Return loads, shape (LOADS,), over a range of angles [rad]."""
+        ends = np.interp([low, high], self.theta, self.load)
+        return np.linspace(np.min(ends), np.max(ends) + 1e-9 * (1.0 + np.ptp(self.load)), LOADS)
+
+    def width_at(self, load: float) -> float:
+        """Return by how much the loop is wider under a load."""
+        return float(np.interp(load, self.load[self._by_load], self.width[self._by_load]))
+
+    def angle(self, loads: np.ndarray, outputs: np.ndarray) -> np.ndarray:
+        """Return the angle (rows,) at which outputs (loads, rows) give what the arm demands."""
+        if len(outputs) > 1:
+            place = np.clip((self.load - loads[0]) / (loads[1] - loads[0]), 0.0, len(loads) - 1.001)
+            below = place.astype(int)
+            part = (place - below)[:, None]
+            outputs = (1.0 - part) * outputs[below] + part * outputs[below + 1]
+        theta, lacking = self.theta, outputs - self._demand[:, None]
+        above = np.clip(np.argmax(lacking < 0.0, axis=0), 1, len(theta) - 1)
+        column = np.arange(lacking.shape[1])
+        before, after = lacking[above - 1, column], lacking[above, column]
+        share = np.clip(before / np.where(before == after, 1.0, before - after), 0.0, 1.0)
+        return theta[above - 1] + share * (theta[above] - theta[above - 1])
+
+
+def _from_cold(values: np.ndarray) -> np.ndarray:
+    """Return values of rows (rows,) with the cold state before them, which has the first's."""
+    return np.concatenate((values[:1], values))
+
+
+def _held(stage: HysteresisOperator, inputs: np.ndarray, widths: np.ndarray) -> np.ndarray:
+    """Return H2's output above its least for its inputs and what its loop is wider by (rows,)."""
+    if np.any(widths > 0.0):
+        inputs = follow(inputs, widths, np.array([len(inputs)]))
+    stage.reset()
+    return stage.simulate(inputs) - stage.output_range[0]
