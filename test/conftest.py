@@ -20,26 +20,29 @@ SLOW = ('test_bench_diagnosis', 'test_demo', 'test_diagnose', 'test_faults',
         'test_loads', 'test_page_in_browser', 'test_readme', 'test_studio_in_browser',
         'test_table1')
 
-# Nodes and boards at work, their firmware, processes and files, and the package as a whole. They
-# depend on ROS and on compilers, which are the same with all versions of the rest, and wait for
-# each other, so that continuous integration runs them with one set of versions.
-NODES = ('test_architecture', 'test_background', 'test_bag', 'test_board', 'test_board_clocks',
-         'test_board_heat_and_cool', 'test_bridge_node', 'test_commands',
+# Nodes and boards at work, their firmware, processes and files, the arms of the laboratory, and the
+# package as a whole. They depend on ROS and on compilers, which are the same with all versions of
+# the rest, and wait for each other, so that continuous integration runs them with one set of
+# versions.
+NODES = ('test_architecture', 'test_background', 'test_bag', 'test_benchmark', 'test_board',
+         'test_board_clocks', 'test_board_heat_and_cool', 'test_bridge_node', 'test_commands',
          'test_compensator_node', 'test_cut_bag', 'test_description',
          'test_firmware_board', 'test_firmware_files', 'test_firmware_protocol', 'test_first_hour',
-         'test_geometry_node', 'test_lifecycle', 'test_monitor_node', 'test_node_parameters',
-         'test_node_running', 'test_outputs', 'test_packaging', 'test_protection',
-         'test_recording', 'test_start_up', 'test_studio_live', 'test_workers')
+         'test_geometry_node', 'test_laboratory_experiments', 'test_laboratory_hidden_physics',
+         'test_lifecycle', 'test_monitor_node', 'test_node_parameters', 'test_node_running',
+         'test_other_master', 'test_outputs', 'test_packaging', 'test_protection', 'test_recording',
+         'test_start_up', 'test_studio_live', 'test_workers')
 
 # Ten seconds and more of a core each, with little that shorter tests do not show: marked as long.
 LONG = ('test_fault_on_the_machine_code', 'test_a_pulled_cable_of_the_machine_code_likewise',
-        'test_a_damaged_file_is_compiled_anew', 'test_other_packages_keep_their_own_cache',
+        'test_the_fuzzers_find_code_that_is_wrong', 'test_libfuzzer_finds_nothing_at_once',
+        'test_a_damaged_file_is_compiled_anew', 'test_a_change_in_a_called_function_is_seen',
+        'test_other_packages_keep_their_own_cache',
         'test_two_processes_that_compile_at_once_keep_both_results',
         'test_without_any_folder_functions_are_compiled_all_the_same',
         'test_pages_build_without_warnings',
         'test_a_dask_cluster_takes_the_diagnosis_as_the_readme_says',
-        'test_noise_that_is_slow_is_not_taken_for_an_effect[1]',
-        'test_noise_that_is_slow_is_not_taken_for_an_effect[2]',
+        'test_noise_that_is_slow_is_not_taken_for_an_effect',
         'test_effect_that_begins_in_mid_run_is_named',
         'test_a_sine_as_a_trajectory_is_as_good_as_angle_by_angle',
         'test_commands_warn_of_loads_beyond_the_bench',

@@ -15,6 +15,7 @@ from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.parameters import ParameterVector
+from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import experiment_tables
@@ -133,6 +134,19 @@ def test_what_too_few_trials_name_again_cannot_be_determined(monkeypatch, share,
     assert found.missing == missing
     reason = found.not_excited.get('thermal_lag', '')
     assert ('cannot be determined here: with one load left out' in reason) != bool(missing)
+
+
+@pytest.mark.parametrize('practical, missing', [
+    (0.2, {'thermal_lag', 'creep'}), (0.4, {'thermal_lag'})])
+def test_an_effect_more_has_to_matter(practical, missing):
+    """The second takes a fifth off the error here: less than what is asked for counts as none."""
+    measurement = table(lambda drive: lagging(drive) + 0.3 * creeping(drive))
+    model = identify(measurement, operator='preisach', levels=(12, 12)).model
+    found = diagnose(model, [measurement], ('thermal_lag', 'creep'), seed=1,
+                     settings=dataclasses.replace(Settings(), practical=practical))
+    assert set(found.missing) == missing
+    likely = {frozenset(one['effects']): one['probability'] for one in found.sets}
+    assert likely[frozenset({'thermal_lag', 'creep'})] > likely[frozenset({'thermal_lag'})] > 0.0
 
 
 def test_creep_of_a_polymer_shows_and_is_plausible():
