@@ -366,6 +366,28 @@ def test_board_that_goes_silent_and_comes_back():
         until(lambda: far.board.duty > 0.0, 'the voltage')
 
 
+def test_a_host_that_was_held_up_listens_before_it_calls_a_board_silent(monkeypatch):
+    """What it read before it was held up says nothing of the time since."""
+    far = BoardOnTerminal()
+    read, held_up = BoardLink.read, []
+
+    def read_late(link):
+        frames = read(link)
+        if held_up:
+            time.sleep(held_up.pop())
+            return []
+        return frames
+
+    monkeypatch.setattr(BoardLink, 'read', read_late)
+    with Terminal(far) as terminal, Board(terminal.port, timeouts=QUICK) as board:
+        until(lambda: board.status.online, 'the board')
+        held_up.append(2.0 * QUICK.telemetry)
+        until(lambda: not held_up, 'the delay')
+        before = board.status.sample.time
+        until(lambda: board.status.sample.time > before, 'telemetry after it')
+        assert board.status.online and board.status.connections == 1
+
+
 def test_board_watchdog_switches_off_when_the_host_is_silent(boards, monkeypatch):
     far = BoardOnTerminal()
     with Terminal(far) as terminal:

@@ -13,6 +13,10 @@ from tools.faults.fault import BEGIN, LIMIT, VOLTAGE
 from tools.faults.run import run_all
 from tools.faults.table import BOARDS, committed
 
+# Speeds of the arm's clock against the wall's, by which its times are: what a busy machine makes
+# late at one of them, it does not at a slower one, and what our code does late stays late.
+SLOWER = (0.3, 0.1)
+
 
 def check(fault, outcome):
     """Hot before it, off in time after it, and never more than was asked for."""
@@ -40,11 +44,11 @@ def passes(fault, outcome):
 
 
 def outcomes_of(faults, scheme):
-    """Run them side by side; one that a busy machine made late gets another try alone."""
+    """Run them side by side; those that a busy machine made late again, on ever slower arms."""
     made = run_all(faults, scheme)
-    for fault in faults:
-        if not passes(fault, made[fault.name]):
-            made.update(run_all([fault], scheme))
+    for speed in SLOWER:
+        late = [fault for fault in faults if not passes(fault, made[fault.name])]
+        made.update(run_all(late, scheme, speed))
     return made
 
 
@@ -121,7 +125,11 @@ def heats_only_when_enabled_again(board):
 @pytest.mark.parametrize('number', processes.HOSTS)
 def test_a_host_that_dies_leaves_the_muscle_off(number):
     """Without a last word."""
-    assert 0.0 < processes.silence_host(number) <= LIMIT
+    for speed in (1.0, *SLOWER):
+        seconds = processes.silence_host(number, speed=speed)
+        if seconds <= LIMIT:
+            break
+    assert 0.0 < seconds <= LIMIT
 
 
 @pytest.mark.parametrize('name', processes.NODES)
@@ -140,8 +148,8 @@ def test_a_node_that_dies_switches_the_machine_code_off(name, domain_id, machine
 
 def dies_and_switches_off(name, scheme):
     pytest.importorskip('rclpy', reason='the nodes need ROS 2')
-    for _ in range(3):      # a machine with other work may keep a live process waiting, too
-        seconds, said = processes.kill_node(name, scheme)
+    for speed in (None, *SLOWER):
+        seconds, said = processes.kill_node(name, scheme, speed)
         if seconds <= LIMIT:
             break
     assert seconds <= LIMIT

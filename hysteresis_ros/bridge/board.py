@@ -24,7 +24,7 @@ import time
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.bridge.board_clock import BoardClock
-from hysteresis_ros.bridge.board_link import BoardLink, Timeouts
+from hysteresis_ros.bridge.board_link import BoardLink, READ_TIMEOUT, Timeouts
 from hysteresis_ros.bridge.board_state import Sample, Status
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.messages import (
@@ -347,10 +347,19 @@ class Board:
             self._connections += 1
 
     def _listen(self) -> None:
-        """Read telemetry until the board starts anew; raise when it is lost."""
+        """
+        Read telemetry until the board starts anew; raise when it is lost.
+
+        Only time in which this thread listened counts: a machine that held it up may have kept the
+        board's words, too.
+        """
         patience = self._timeouts.telemetry * self.slowness
+        silence = 0.0
         while not self._stopping.is_set():
-            for frame in self._link.read():
+            begin = time.monotonic()
+            frames = self._link.read()
+            silence += min(time.monotonic() - begin, READ_TIMEOUT)
+            for frame in frames:
                 if frame.kind == NO:
                     self._refusal = frame.fields.get('reason', 'no reason')
                 if frame.kind in (OK, NO):
@@ -364,9 +373,10 @@ class Board:
                     self._lose(f'port {self._link.port}: the board has started anew')
                     return
                 self._take(telemetry)
+                silence = 0.0
             if self._write_problem is not None:
                 raise self._write_problem
-            if time.monotonic() - self._received > patience:
+            if silence > patience:
                 raise BoardError(f'port {self._link.port}: the board is silent, no new telemetry '
                                  f'for {patience:.3g} s; the output is off')
 

@@ -52,7 +52,7 @@ class Timeouts:
     refused : float
         A setpoint that a refused one follows is held for so long, unless a good one comes.
     telemetry : float
-        Without telemetry for so long, the board counts as lost.
+        Without telemetry while the host listened for so long, the board counts as lost.
     late : float
         Without telemetry for so long, nothing is heated; with telemetry slower than that, 2.5
         periods. A board that runs faster than the wall's clock burns nothing: there `telemetry`

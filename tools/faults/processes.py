@@ -51,23 +51,24 @@ def _last_heated(cable: Cable, begun: float) -> float:
 
 
 @contextlib.contextmanager
-def board_on_terminal(scheme: str) -> Iterator[tuple[str, Cable]]:
+def board_on_terminal(scheme: str, speed: float | None = None) -> Iterator[tuple[str, Cable]]:
     """Give a board's terminal and its cable; ``sim`` or ``avr``."""
+    url = url_of(scheme, speed=speed)
     if scheme == 'sim':
-        port = LatePort(url_of('sim'))
+        port = LatePort(url)
         with PortOnTerminal(port) as terminal:
             yield terminal.name, port.cable
         return
-    chip = Chip(url_of('avr'))
+    chip = Chip(url)
     try:
         yield chip.terminal, chip.cable
     finally:
         chip.close()
 
 
-def silence_host(number: signal.Signals, scheme: str = 'sim') -> float:
+def silence_host(number: signal.Signals, scheme: str = 'sim', speed: float | None = None) -> float:
     """Stop a host that heats by a signal; return the time until zero duty [s of the arm]."""
-    with board_on_terminal(scheme) as (terminal, cable):
+    with board_on_terminal(scheme, speed) as (terminal, cable):
         child = subprocess.Popen([sys.executable, '-c', HOST, terminal],
                                  env={**os.environ, 'PYTHONPATH': str(ROOT)})
         try:
@@ -80,7 +81,7 @@ def silence_host(number: signal.Signals, scheme: str = 'sim') -> float:
             child.wait()
 
 
-def kill_node(name: str, scheme: str = 'sim') -> tuple[float, str]:
+def kill_node(name: str, scheme: str = 'sim', speed: float | None = None) -> tuple[float, str]:
     """
     Kill one of the three nodes in the middle of a run.
 
@@ -90,6 +91,8 @@ def kill_node(name: str, scheme: str = 'sim') -> tuple[float, str]:
         ``compensator_node`` or ``geometry_node``.
     scheme : str
         Of the board: ``sim`` or ``avr``.
+    speed : float, optional
+        Of the arm's clock against the wall's; None for that of `BOARDS`.
 
     Returns
     -------
@@ -112,7 +115,7 @@ def kill_node(name: str, scheme: str = 'sim') -> tuple[float, str]:
             lambda message: voltages.append((time.monotonic(), message.data)), 100)
         statuses = graph.status()
         children = {one: stack.enter_context(process(
-            one, '--ros-args', '-p', 'telemetry_rate:=50.0', '-p', f'port:={url_of(scheme)}'))
+            one, '--ros-args', '-p', 'telemetry_rate:=50.0', '-p', f'port:={url_of(scheme, speed=speed)}'))
             for one in ('bridge_node', 'geometry_node', 'compensator_node')}
         targets = graph.probe.create_publisher(Float64, 'target_angle', 1)
         graph.until(lambda: targets.get_subscription_count() and voltages
@@ -129,7 +132,8 @@ def kill_node(name: str, scheme: str = 'sim') -> tuple[float, str]:
         graph.spin(1.0)
         assert all(volts == 0.0 for when, volts in voltages if when > zero)
         said = [status.message for status in statuses if 'has died' in status.message]
-        return (zero - begun) * BOARDS[scheme][1], said[-1] if said else ''
+        rate = BOARDS[scheme][1] if speed is None else speed
+        return (zero - begun) * rate, said[-1] if said else ''
 
 
 def wait_for(condition: Callable[[], object], what: str) -> None:

@@ -26,9 +26,10 @@ PERIOD = 0.1            # s of the arm between two setpoints
 BOARDS = {'sim': (30, 1.0), 'avr': (2, 0.5)}
 
 
-def url_of(scheme: str, query: str = '') -> str:
-    """Return the URL of a board, ``sim`` or ``avr``, with these keys."""
-    return '&'.join(filter(None, (f'{scheme}://bicep?speed={BOARDS[scheme][1]:g}', query)))
+def url_of(scheme: str, query: str = '', speed: float | None = None) -> str:
+    """Return the URL of a board, ``sim`` or ``avr``, with these keys, at that or its usual speed."""
+    speed = BOARDS[scheme][1] if speed is None else speed
+    return '&'.join(filter(None, (f'{scheme}://bicep?speed={speed:g}', query)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,6 +75,8 @@ class Run:
     fault : Fault
     scheme : str
         ``sim`` for the simulated board, ``avr`` for the machine code.
+    speed : float, optional
+        Of the arm's clock against the wall's; None for that of `BOARDS`.
 
     Attributes
     ----------
@@ -83,12 +86,12 @@ class Run:
         The board with arm and cable.
     """
 
-    def __init__(self, fault: Fault, scheme: str) -> None:
+    def __init__(self, fault: Fault, scheme: str, speed: float | None = None) -> None:
         self._fault = fault
         self._trace: Trace = []
         self._said: dict[str, float] = {}
         self._next = 0.0        # when a setpoint is due
-        self.board = Board(url_of(scheme, fault.query), encoder=Encoder(index='check'))
+        self.board = Board(url_of(scheme, fault.query, speed), encoder=Encoder(index='check'))
         made = self.board._link._serial
         self.rig: LatePort | Chip
         if scheme == 'sim':
@@ -173,7 +176,8 @@ class Run:
         return last + TICK / 1000.0 - begun if last < after[-1][0] else math.inf
 
 
-def run_all(faults: Sequence[Fault], scheme: str = 'sim') -> dict[str, Outcome]:
+def run_all(faults: Sequence[Fault], scheme: str = 'sim', speed: float | None = None
+            ) -> dict[str, Outcome]:
     """
     Run faults on one of the boards, side by side.
 
@@ -182,6 +186,9 @@ def run_all(faults: Sequence[Fault], scheme: str = 'sim') -> dict[str, Outcome]:
     faults : sequence of Fault
     scheme : str
         ``sim`` or ``avr``.
+    speed : float, optional
+        As of `Run`. Times are those of the arm's clock, so that a machine that is held up now and
+        then spoils less of a slower run.
 
     Returns
     -------
@@ -190,4 +197,4 @@ def run_all(faults: Sequence[Fault], scheme: str = 'sim') -> dict[str, Outcome]:
     """
     with ThreadPoolExecutor(BOARDS[scheme][0]) as pool:
         return dict(zip((fault.name for fault in faults),
-                        pool.map(lambda fault: Run(fault, scheme).run(), faults)))
+                        pool.map(lambda fault: Run(fault, scheme, speed).run(), faults)))
