@@ -111,6 +111,12 @@ def test_a_loop_that_weights_can_give_is_adequate():
     assert (found.verdict, found.missing) == ('adequate', [])
 
 
+def test_what_a_muscle_cannot_have_is_said_where_it_was_asked_for():
+    """Pressure heats nothing."""
+    found = found_in(table(muscle), ('thermal_lag', 'latency'))
+    assert found.not_excited['thermal_lag'] == 'a muscle of this kind does not have it'
+
+
 def test_a_lag_shows_without_an_arm():
     """With the time constant that it has, here and there."""
     found = found_in(table(lagging))

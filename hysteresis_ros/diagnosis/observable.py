@@ -42,6 +42,8 @@ def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
         if problem.catalogue is not None and name not in problem.catalogue:
             continue
         if not effect.available(surroundings):
+            if problem.catalogue is not None:
+                unobservable[name] = 'a muscle of this kind does not have it'
             continue
         if problem.catalogue is None and effect.doubtful(surroundings):
             continue
