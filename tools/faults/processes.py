@@ -66,8 +66,13 @@ def board_on_terminal(scheme: str, speed: float | None = None) -> Iterator[tuple
         chip.close()
 
 
-def silence_host(number: signal.Signals, scheme: str = 'sim', speed: float | None = None) -> float:
-    """Stop a host that heats by a signal; return the time until zero duty [s of the arm]."""
+def silence_host(number: signal.Signals, scheme: str = 'sim', speed: float | None = None
+                 ) -> float:
+    """
+    Stop a host that heats by a signal; return the time until zero duty [s of the arm].
+
+    `scheme` and `speed` as of `kill_node`.
+    """
     with board_on_terminal(scheme, speed) as (terminal, cable):
         child = subprocess.Popen([sys.executable, '-c', HOST, terminal],
                                  env={**os.environ, 'PYTHONPATH': str(ROOT)})
@@ -81,7 +86,8 @@ def silence_host(number: signal.Signals, scheme: str = 'sim', speed: float | Non
             child.wait()
 
 
-def kill_node(name: str, scheme: str = 'sim', speed: float | None = None) -> tuple[float, str]:
+def kill_node(name: str, scheme: str = 'sim', speed: float | None = None
+              ) -> tuple[float, str]:
     """
     Kill one of the three nodes in the middle of a run.
 
@@ -114,8 +120,9 @@ def kill_node(name: str, scheme: str = 'sim', speed: float | None = None) -> tup
             Float64, 'applied_voltage',
             lambda message: voltages.append((time.monotonic(), message.data)), 100)
         statuses = graph.status()
+        port = url_of(scheme, speed=speed)
         children = {one: stack.enter_context(process(
-            one, '--ros-args', '-p', 'telemetry_rate:=50.0', '-p', f'port:={url_of(scheme, speed=speed)}'))
+            one, '--ros-args', '-p', 'telemetry_rate:=50.0', '-p', f'port:={port}'))
             for one in ('bridge_node', 'geometry_node', 'compensator_node')}
         targets = graph.probe.create_publisher(Float64, 'target_angle', 1)
         graph.until(lambda: targets.get_subscription_count() and voltages

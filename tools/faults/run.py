@@ -27,7 +27,7 @@ BOARDS = {'sim': (30, 1.0), 'avr': (2, 0.5)}
 
 
 def url_of(scheme: str, query: str = '', speed: float | None = None) -> str:
-    """Return the URL of a board, ``sim`` or ``avr``, with these keys, at that or its usual speed."""
+    """Return a board's URL, ``sim`` or ``avr``, with these keys, at its usual speed or that."""
     speed = BOARDS[scheme][1] if speed is None else speed
     return '&'.join(filter(None, (f'{scheme}://bicep?speed={speed:g}', query)))
 
