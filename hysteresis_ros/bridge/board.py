@@ -17,21 +17,20 @@ in doubt, and whatever `Protection` or the board's own duty shows. `Status.fault
 
 from __future__ import annotations
 
-import collections
 from collections.abc import Callable
 import threading
 import time
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.bridge.board_clock import BoardClock
+from hysteresis_ros.bridge.board_config import BoardConfig
 from hysteresis_ros.bridge.board_link import BoardLink, READ_TIMEOUT, Timeouts
 from hysteresis_ros.bridge.board_state import Sample, Status
 from hysteresis_ros.bridge.encoder import Encoder
 from hysteresis_ros.bridge.messages import (
     CONFIG, DISABLE, ENABLE, FAULTS, Identity, LATCHED, NO, OK, SET, Telemetry, TELEMETRY)
 from hysteresis_ros.bridge.other_master import OtherMaster
-from hysteresis_ros.bridge.protection import Limits, Protection
-from hysteresis_ros.bridge.protocol import write_number
+from hysteresis_ros.bridge.protection import Protection
 from hysteresis_ros.bridge.pwm import Pwm
 from hysteresis_ros.errors import BoardError, HysteresisError, ProtocolError, RangeError
 
@@ -42,7 +41,6 @@ SUPPLY_SAMPLES = 50         # measurements of the supply over which is averaged,
 SUPPLY_JUMP = 0.03          # relative change that is taken at once
 STOP_PATIENCE = 0.5         # s to wait on the way out until the board says that it is off
 RAMP_DT = 0.02              # s of the wall between two setpoints of a soft start
-RMS_MARGIN = 1.1            # of the board's limit over ours, which counts by its samples alone
 
 
 class Board:
@@ -135,11 +133,8 @@ class Board:
         self._ramping = False       # a soft start is on its way up
         self._other_master = OtherMaster()
         self._refusal = ''
-        self._config: Fields = {}       # for the board, from these:
-        self._config_from: tuple[Limits, Pwm] | None = None
-        self._config_asked: str | None = None   # sequence number with which it was sent last;
-        self._config_open = False               # nobody has answered
-        self._answered: collections.deque[str] = collections.deque(maxlen=20)
+        self._config = BoardConfig(telemetry_period, timeouts.watchdog,
+                                   (1.0 + supply_tolerance) * supply)
         self._connections = 0
         self._threads = [threading.Thread(target=target, name=name, daemon=True)
                          for target, name in ((self._run, 'board reader'),
@@ -329,7 +324,9 @@ class Board:
             delay = min(2.0 * delay, self._timeouts.last_retry)
 
     def _greet(self) -> None:
-        identity = self._link.greet(self._config_for, self._stopping)
+        limits, pwm = self.protection.limits, self.pwm
+        identity = self._link.greet(
+            lambda identity: self._config.fields(identity, limits, pwm), self._stopping)
         with self._wake:
             if self._identity is None:
                 self._encoder.counter_bits = identity.counter_bits
@@ -339,8 +336,7 @@ class Board:
                 self._clock.begin(
                     identity.time, (time.monotonic() - self._received) * identity.speed)
             self._identity = identity
-            self._config_from = self.protection.limits, self.pwm
-            self._config_open = False
+            self._config.greeted(limits, pwm)
             self._received = time.monotonic()
             self._write_problem = None
             self._supply = None
@@ -363,7 +359,7 @@ class Board:
                 if frame.kind == NO:
                     self._refusal = frame.fields.get('reason', 'no reason')
                 if frame.kind in (OK, NO):
-                    self._answered.append(frame.fields.get('re', ''))
+                    self._config.answered(frame.fields.get('re', ''))
                 if frame.kind != TELEMETRY:
                     continue
                 telemetry = Telemetry.from_frame(frame)
@@ -449,7 +445,7 @@ class Board:
                 for kind, fields in commands:
                     sequence = self._link.send(kind, fields)
                     if kind == CONFIG:
-                        self._config_asked = str(sequence)
+                        self._config.sent(sequence)
                     elif kind == SET:
                         self._note_sent(sequence)
             except (BoardError, ProtocolError) as error:
@@ -458,8 +454,9 @@ class Board:
     def _commands(self) -> list[tuple[str, Fields | None]]:
         """Return what the board has to hear now: (kind, fields) each."""
         commands: list[tuple[str, Fields | None]] = []
-        if self._config_is_due():
-            commands.append((CONFIG, self._config))
+        limits, pwm = self.protection.limits, self.pwm
+        if self._identity is not None and self._config.is_due(limits, pwm):
+            commands.append((CONFIG, self._config.fields(self._identity, limits, pwm)))
         if self._sample is None or self._wanted != self._sample.enabled:
             commands.append((ENABLE if self._wanted else DISABLE, None))
         elif self._wanted:
@@ -469,29 +466,6 @@ class Board:
         elif _latched(self._sample):
             commands.append((DISABLE, None))    # that its reason may be gone is for it to see
         return commands
-
-    def _config_is_due(self) -> bool:
-        """Whether the limits have changed, and the board has not answered since."""
-        made_from = self.protection.limits, self.pwm
-        if made_from != self._config_from and self._identity is not None:
-            self._config_from = made_from
-            self._config = self._config_for(self._identity)
-            self._config_asked, self._config_open = None, True
-        if self._config_asked in self._answered:
-            self._config_open = False
-        return self._config_open
-
-    def _config_for(self, identity: Identity) -> Fields:
-        """Return the periods and limits that a board is told."""
-        fields: dict[str, str | int | float] = {
-            'period': round(1000.0 * self._period),
-            'watchdog': round(1000.0 * self._timeouts.watchdog * max(identity.speed, 1.0))}
-        limits = self.protection.limits
-        if limits.rms_voltage:
-            highest_supply = (1.0 + self._supply_tolerance) * self._nominal_supply
-            rms = RMS_MARGIN * self.pwm.rms(limits.rms_voltage, highest_supply)
-            fields.update(rms=write_number(rms, 3), rms_window=round(1000.0 * limits.rms_window))
-        return fields
 
     def _duty(self) -> float:
         self._limit = ''
