@@ -22,6 +22,7 @@ STRENGTHS = {
     'pwm_dead_zone': {'Vd': 0.4}, 'resistance_change': {'eta': 0.1},
     'airflow': {'beta': 1.2}, 'thermal_lag': {'time_constant': 3.0},
     'heating_cooling_asymmetry': {'time_constant': 3.0, 'ratio': 1.5},
+    'heat_loss': {'time_constant': 4.0, 'growth': 0.6},
     'valve_lag': {'filling': 2.0, 'venting': 4.0},
     'latent_heat': {'time_constant': 3.0, 'latent': 0.2},
     'ambient_temperature': {'gain': 0.3, 'reference': 25.0},

@@ -20,6 +20,7 @@ from hysteresis_ros.laboratory.cable import Cable
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.encoder_disc import EncoderDisc
 from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
+from hysteresis_ros.laboratory.still_air import StillAir
 from hysteresis_ros.laboratory.supply import Supply
 from hysteresis_ros.laboratory.unlisted import Unlisted, UNLISTED
 from hysteresis_ros.spelling import unknown
@@ -98,6 +99,12 @@ def _latent_heat(conditions: Conditions, size: float, specimen: np.random.Genera
                  recording: np.random.Generator) -> None:
     conditions.heat.time_constant = max(conditions.heat.time_constant, 2.0)
     conditions.heat.latent = ENTHALPY / SPECIFIC_HEAT * size
+
+
+def _heat_loss(conditions: Conditions, size: float, specimen: np.random.Generator,
+               recording: np.random.Generator) -> None:
+    conditions.heat.time_constant = max(conditions.heat.time_constant, 4.0)
+    conditions.heat.air = StillAir(min(0.85 * size, 1.0))
 
 
 def _ambient_temperature(conditions: Conditions, size: float, specimen: np.random.Generator,
@@ -299,6 +306,8 @@ LATER = {
                                    _encoder_eccentricity),
     'measured_supply': Effect('The battery runs down and dips; the board counts on its nominal '
                               'voltage, and a meter records it.', _measured_supply),
+    'heat_loss': Effect('Still air takes heat off a hot wire faster than off a warm one (time '
+                        'constant 4 s in the air of the bench).', _heat_loss),
 }
 
 EFFECTS = {**LISTED, **{name: Effect(kind.__doc__ or '', _disturb(kind), listed=False)
