@@ -157,7 +157,7 @@ def test_every_effect_changes_what_an_arm_run_shows(name):
 def test_implausible_values_are_named_but_neutral_ones_are_not():
     model = bicep_model()
     assert effect_of(model, 'fatigue', a=0.4).implausible() == ['a']
-    assert effect_of(model, 'fatigue', a=-0.1).implausible() == ['a']
+    assert effect_of(model, 'fatigue', a=-0.4).implausible() == ['a']
     assert effect_of(model, 'encoder_offset', offset=-3.0).implausible() == []
     assert effect_of(model, 'end_stop', stop=1.0, side=0.5, stiffness=1.0).implausible() == ['side']
 

@@ -233,6 +233,19 @@ def test_fatigue_counts_cycles():
     assert Plant(0, {'fatigue': 1.0}).arm.muscle.cycles == 0.0
 
 
+def test_training_gains_stroke_cycle_by_cycle():
+    """The wire gets longer when cold, and by more than that of its stroke."""
+    arm = Plant(0, {'fatigue': -1.0}).arm
+    strokes, cold = [], []
+    for _ in range(10):
+        arm.settle(30.0, 6.0)
+        hot = arm.angle
+        arm.settle(30.0, 0.0)
+        strokes.append(arm.angle - hot)
+        cold.append(arm.angle)
+    assert cold[-1] > cold[0] + 0.03 and strokes[-1] > strokes[0] + 0.02
+
+
 def test_unequal_wires_share_the_load():
     """The shortest pulls most; together they hold the weight."""
     arm = calm(wire_offsets=(-0.003, 0.0, 0.003))

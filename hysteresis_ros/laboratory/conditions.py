@@ -117,9 +117,9 @@ class Conditions:
     creep_time : float
         Time from which that logarithm counts [s].
     shrinkage : float
-        Share of the resting length that a wire loses per factor e of cycles.
+        Share of the resting length that a wire loses per factor e of cycles; negative in training.
     tiring : float
-        Share of the grains that stay martensite per factor e of cycles.
+        Share of the grains that stay martensite per factor e of cycles; negative in training.
     dead_length : float
         Length of each wire that hangs loose [m].
     compliance : float

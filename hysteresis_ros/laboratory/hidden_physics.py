@@ -269,8 +269,9 @@ LISTED = {
                       bench=True),
     'creep': Effect('The wire goes on in the direction of its last step, with the logarithm of '
                     'time.', _creep, bench=True),
-    'fatigue': Effect('With every cycle the wire gets shorter and more of it stays martensite.',
-                      _fatigue, bench=True),
+    'fatigue': Effect('With every cycle the wire gets shorter and more of it stays martensite; '
+                      'where negative, it is in training: it gets longer, and less stays.',
+                      _fatigue, signed=True, bench=True),
     'slack': Effect('A part of each wire hangs loose.', _slack, bench=True),
     'series_compliance': Effect('Crimps and cable stretch in series with the wire.',
                                 _series_compliance, bench=True),

@@ -116,9 +116,10 @@ class ParallelWires:
         conditions = self._conditions
         if conditions.creep > 0.0:
             self._creep_on(voltage, dt)
-        if conditions.tiring > 0.0:
+        if conditions.tiring != 0.0:
             for wire in self.wires:
-                wire.retained = min(conditions.tiring * math.log1p(self.cycles), 0.8)
+                retained = conditions.tiring * math.log1p(self.cycles)
+                wire.retained = min(max(retained, -0.8), 0.8)
         self._extra = extra
         self._set_excess()
 
