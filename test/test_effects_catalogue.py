@@ -52,6 +52,8 @@ EXPECTED = {
     'coulomb_friction': ('mechanism', 'reversals', 'tap', {'backlash'}),
     'cable_friction': ('mechanism', 'in proportion to the load', 'another payload',
                        {'coulomb_friction', 'backlash'}),
+    'wire_break': ('mechanism', 'one moment', 'look at the muscles',
+                   {'fatigue', 'payload_error', 'slack'}),
     'viscous_friction': ('mechanism', 'dtheta/dt', 'swing', {'thermal_lag', 'latency'}),
     'inertia': ('mechanism', 'ringing', 'pluck', {'viscous_friction'}),
     'payload_error': ('mechanism', 'gravity curve', 'scale', {'frame_tilt', 'supply_sag'}),
@@ -80,6 +82,7 @@ RANGES = {
     ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),
     ('coulomb_friction', 'tau_c'): ('N m', 0.001, 0.150),
     ('cable_friction', 'mu_phi'): ('1', 0.005, 1.0),
+    ('wire_break', 'time'): ('s', 1.0, 1e5),
     ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 5., 100.),
     # A clamp of 50 g, too: the base model's own error alone may look like 10 g.
     ('clamp_mass', 'moment'): ('g m', 5.0 * 0.020, 50.0 * 0.050),

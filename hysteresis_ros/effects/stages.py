@@ -168,6 +168,8 @@ class MechanismEffect(Effect):
     """Effect on the arm: what it asks of the muscle at rest, and what resists its motion."""
 
     stage = 'mechanism'
+    # When one of the muscles breaks, since the recording began [s].
+    break_time: float = math.inf
 
     def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Return the arm at rest with the effect; by default unchanged."""

@@ -176,6 +176,8 @@ class Arm:
             self._change()
             self._change = None
             self._adapt()
+        if self.time > conditions.break_time:
+            self.muscle.count = conditions.linkage.muscle_count - 1
         air = conditions.air
         kept = math.exp(-dt / air.turbulence_time)
         self._fluctuation = kept * self._fluctuation + (

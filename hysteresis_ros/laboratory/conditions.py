@@ -126,6 +126,8 @@ class Conditions:
         Of what is in series with each wire [m/N].
     wire_offsets : tuple of float
         By how much each wire is longer than the others [m]; one entry: the wires are alike.
+    break_time : float
+        When one of the wires breaks, since the recording began [s]; infinite: never.
     coulomb, viscous, inertia : float
         Friction [N m], damping [N m s/rad] and moment of inertia [kg m^2]; no inertia: the arm
         follows at once.
@@ -159,6 +161,7 @@ class Conditions:
     dead_length: float = 0.0
     compliance: float = 0.0
     wire_offsets: tuple = (0.0,)
+    break_time: float = math.inf
     coulomb: float = 0.0
     viscous: float = 0.0
     inertia: float = 0.0

@@ -89,6 +89,16 @@ class Chain:
         return any(effect.moves for effect in self.mechanism)
 
     @property
+    def breaking(self) -> list[MechanismEffect]:
+        """Effects by which one of the arm's muscles breaks."""
+        return [effect for effect in self.mechanism if effect.break_time < math.inf]
+
+    @property
+    def break_time(self) -> float:
+        """When one of them does so first, since the recording began [s]."""
+        return min((effect.break_time for effect in self.mechanism), default=math.inf)
+
+    @property
     def drifts(self) -> bool:
         """Whether time or history add to the elongation."""
         return bool(self.drifting)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import math
 import os
 from collections.abc import Sequence
 from typing import Any, TYPE_CHECKING
@@ -13,6 +14,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.bicep.balance import ArmBalance
+from hysteresis_ros.bicep.breaking import BreakingBalance
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.effects import Effect, Surroundings
 from hysteresis_ros.effects.base import Values
@@ -108,7 +110,8 @@ class MuscleModel:
         least = self.length_stage.output_range[0] if self.length_stage is not None else 0.0
         return Surroundings(length, self.mean_load, float(bare.to_drive_squared(largest)), span,
                             self.drive, self.load_name, self.response, self.cold_drive,
-                            self.drive_range, self.sign, rest_load, least)
+                            self.drive_range, self.sign, rest_load, least,
+                            int(self.geometry.muscle_count) if self.geometry else 1)
 
     def with_effects(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return a copy with other effects and the same operators."""
@@ -179,7 +182,8 @@ class MuscleModel:
         from hysteresis_ros.model.observer import Observer
         return Observer(self)
 
-    def balance(self, chain: Chain, statics: Statics | None = None) -> ArmBalance:
+    def balance(self, chain: Chain, statics: Statics | None = None, muscles: int | None = None
+                ) -> ArmBalance:
         """
         Return the balance between the muscle, its memory wiped, and the arm.
 
@@ -189,6 +193,8 @@ class MuscleModel:
             Effects of the model.
         statics : Statics, optional
             The arm that the geometry describes at rest, where it was computed before.
+        muscles : int, optional
+            How many muscles carry the load; by default those of the geometry.
 
         Raises
         ------
@@ -206,7 +212,19 @@ class MuscleModel:
             raise ParameterError(
                 f'the model gives {self.response} under {self.load_name}; the bicep needs a '
                 'length table with forces')
-        return ArmBalance(stage, geometry, chain, loaded, statics)
+        return ArmBalance(stage, geometry, chain, loaded, statics, muscles)
+
+    def lifting(self, chain: Chain) -> ArmBalance | BreakingBalance:
+        """Return the same, or where a muscle breaks the balances before and after that."""
+        if chain.break_time == math.inf:
+            return self.balance(chain)
+        return BreakingBalance(self.balance(chain), self.balance(chain, muscles=self.remaining),
+                               chain.break_time)
+
+    @property
+    def remaining(self) -> int:
+        """How many muscles lift the arm after one has broken; the last one does not break."""
+        return max(int(self.require_geometry().muscle_count) - 1, 1)
 
     def require_geometry(self) -> BicepGeometry:
         """Return the arm's geometry; ParameterError if the model has none."""

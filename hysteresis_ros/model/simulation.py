@@ -13,6 +13,7 @@ from typing import NamedTuple, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.bicep.balance import ArmBalance, statics_of
+from hysteresis_ros.bicep.breaking import BreakingBalance
 from hysteresis_ros.effects import Effect, Inputs
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.kernels.load_play import follow
@@ -266,7 +267,7 @@ class Simulator:
         """Return the response of an arm whose phase is found in each row before the next."""
         balance = self._balance(chain)
         arm = Stepper(self.model, chain, self.model.first_stage(chain), balance)
-        rest = arm.start()
+        rest = arm.start(float(trial.inputs.clock[0] - trial.inputs.dt[0]))
         columns = [np.broadcast_to(column, trial.drive.shape).tolist()
                    for column in (trial.drive, *trial.inputs)]
         rows = [(arm.step(drive, Inputs(*inputs)), balance.output, balance.operators[0].input)
@@ -300,13 +301,23 @@ class Simulator:
         stage = self.model.require_length_stage()
         return lambda trials: [self._length(chain, first, stage, trial) for trial in trials]
 
-    def _balance(self, chain: Chain) -> ArmBalance:
-        """Return the balance of an arm; most sets of effects differ in what it does not see."""
-        key = tuple((effect.id, *effect.values.values())
-                    for effect in (*chain.material, *chain.mechanism))
+    def _balance(self, chain: Chain) -> ArmBalance | BreakingBalance:
+        """Return the balance of an arm, and where a muscle breaks that with one less, too."""
+        intact = self._balance_with(chain, None)
+        if chain.break_time == np.inf:
+            return intact
+        return BreakingBalance(intact, self._balance_with(chain, self.model.remaining),
+                               chain.break_time)
+
+    def _balance_with(self, chain: Chain, muscles: int | None) -> ArmBalance:
+        """Return the balance of some muscles; most sets of effects differ in what it knows not."""
+        # When a muscle breaks, neither of the two knows.
+        key = (muscles, *((effect.id, *effect.values.values())
+                          for effect in (*chain.material, *chain.mechanism)
+                          if effect not in chain.breaking))
         made = self._balances.get(key)
         if made is None:
-            made = self.model.balance(chain, self._statics)
+            made = self.model.balance(chain, self._statics, muscles)
             if len(self._balances) >= MOST_BALANCES:
                 self._balances.clear()
             self._balances[key] = made
@@ -346,7 +357,7 @@ class Simulator:
         return Response(base + chain.scale(trial.load) * factor * (output - base)
                         + chain.stretch(trial.load) + offset, output)
 
-    def _angles(self, chain: Chain, first: FirstStage, balance: ArmBalance,
+    def _angles(self, chain: Chain, first: FirstStage, balance: ArmBalance | BreakingBalance,
                 asked: np.ndarray | None, trials: Sequence[Trial]) -> list[Response]:
         """Return what the arm does; the trials run in one call of the kernel."""
         # The phase is looked at in all rows.
@@ -355,23 +366,34 @@ class Simulator:
         for trial in trials:
             cold, x, drive_squared = self._first(chain, first, trial)
             columns.append(np.array([
-                x, *chain.drift(trial.drive, drive_squared, trial.inputs), trial.inputs.dt]))
+                x, *chain.drift(trial.drive, drive_squared, trial.inputs), trial.inputs.dt,
+                trial.inputs.clock]))
             if asked is not None:
-                rows.append(balanced_rows(
-                    columns[-1][:3], chain.rows_read(asked[trial.rows], trial.inputs), spacing))
+                read = chain.rows_read(asked[trial.rows], trial.inputs)
+                if chain.break_time < np.inf:
+                    read = read | _beside(trial.inputs.clock, chain.break_time)
+                rows.append(balanced_rows(columns[-1][:3], read, spacing))
         kept = [own[:, one] for own, one in zip(columns, rows)] if rows else columns
         ends = np.cumsum([own.shape[1] for own in kept])
-        x, offset, factor, dt = np.concatenate(kept, axis=1)
-        rest, *found = balance.run(cold, ends, x, dt, offset, factor)
+        x, offset, factor, dt, clock = np.concatenate(kept, axis=1)
+        rest, *found = balance.run(cold, ends, x, dt, offset, factor, clock)
         responses = []
-        for place, end in enumerate(ends):
+        for place, (end, angle) in enumerate(zip(ends, np.broadcast_to(rest, len(ends)).tolist())):
             angles, outputs, inputs = (
                 column[end - kept[place].shape[1]:end] for column in found)
             if rows:
                 angles, outputs, inputs = (between(rows[place], columns[place][0], column)
                                            for column in (angles, outputs, inputs))
-            responses.append(Response(angles, outputs, inputs, rest))
+            responses.append(Response(angles, outputs, inputs, angle))
         return responses
+
+
+def _beside(clock: np.ndarray, time: float) -> np.ndarray:
+    """Return whether each row of a trial (rows,) is the last before a time or the first after."""
+    found = np.zeros(len(clock), dtype=bool)
+    after = int(np.searchsorted(clock, time, 'right'))
+    found[max(after - 1, 0):after + 1] = True
+    return found
 
 
 class _Agreement:
