@@ -43,7 +43,7 @@ def drive_arm(model, targets=TARGETS, repeats=1, **options):
 def test_every_effect_that_can_be_undone_is_here():
     assert set(catalogue()) - set(INVERTIBLE) == {
         'ambient_drift', 'creep', 'viscoelastic_creep', 'viscous_friction', 'inertia', 'end_stop',
-        'wire_break', 'latency'}
+        'wire_break', 'overload', 'latency'}
 
 
 @pytest.mark.parametrize('names', [(), *((name,) for name in INVERTIBLE if name not in PHASE),

@@ -47,6 +47,8 @@ EXPECTED = {
     'series_compliance': ('material', 'force', 'weights', {'payload_error', 'geometry_error'}),
     'transformation_slopes': ('material', "loop's width", 'three or more loads',
                               {'stress_dependence', 'r_phase'}),
+    'overload': ('material', 'first time', 'step by step',
+                 {'slack', 'series_compliance', 'fatigue'}),
     'unequal_muscles': ('material', 'smeared knees', 'one muscle at a time',
                         {'slack', 'geometry_error'}),
     'coulomb_friction': ('mechanism', 'reversals', 'tap', {'backlash'}),
@@ -82,6 +84,7 @@ RANGES = {
     ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),
     ('coulomb_friction', 'tau_c'): ('N m', 0.001, 0.150),
     ('cable_friction', 'mu_phi'): ('1', 0.005, 1.0),
+    ('overload', 'Fy'): ('loads', 0.2, 5.0), ('overload', 'compliance'): ('mm/N', 0.1, 20.0),
     ('wire_break', 'time'): ('s', 1.0, 1e5),
     ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 5., 100.),
     # A clamp of 50 g, too: the base model's own error alone may look like 10 g.

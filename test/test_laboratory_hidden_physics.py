@@ -23,7 +23,8 @@ CATALOGUE = (
     'ambient_temperature ambient_drift airflow stress_dependence stress_dependent_strain r_phase '
     'creep fatigue slack series_compliance unequal_muscles coulomb_friction viscous_friction '
     'inertia payload_error clamp_mass geometry_error frame_tilt end_stop encoder_offset backlash '
-    'latency cable_friction encoder_eccentricity measured_supply heat_loss wire_break').split()
+    'latency cable_friction encoder_eccentricity measured_supply heat_loss wire_break '
+    'overload').split()
 MIDDLE = 4.1
 
 

@@ -81,6 +81,7 @@ class ArmBalance:
         self.span = operator.upper - operator.lower
         several = len(chain.offsets) > 1
         wires, self.operators, memories = wires_of(operator, chain, loaded)
+        self._held = statics.theta, statics.moment, leverage
         # At rest, and where the arm sinks and rises against dry friction.
         senses = (0, 1, -1) if sticks else (0,)
         lines = [_line(statics, leverage * grip ** sense, sense * self.coulomb, self.base, chain,
@@ -142,10 +143,15 @@ class ArmBalance:
         """Output of H2 [m], which follows the martensite share; the mean of the muscles."""
         return self._kernels.output(self._arm, self._state)
 
-    def settle(self, x: float, clock: float = 0.0) -> float:
+    def load(self, angle: float) -> float:
+        """Return the load [N] of each muscle that holds the arm at rest at an angle [rad]."""
+        theta, moment, leverage = self._held
+        return float(np.interp(angle, theta, np.maximum(moment, 0.0) / leverage))
+
+    def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
         """Wipe the memory, take up the state of rest under `x`, and return its angle [rad]."""
         self.start()
-        return self.step(x, math.inf)
+        return self.step(x, math.inf, offset)
 
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
              clock: float = 0.0) -> float:

@@ -61,10 +61,14 @@ class BreakingBalance:
         """H2 of each muscle that is told from the others."""
         return self._present.operators
 
-    def settle(self, x: float, clock: float = 0.0) -> float:
+    def load(self, angle: float) -> float:
+        """Return the load [N] of each muscle at an angle [rad]; see `ArmBalance`."""
+        return self._present.load(angle)
+
+    def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
         """Wipe the memory, take up the state of rest under `x` at `clock` [s]; see `ArmBalance`."""
         self._present = self._broken if clock > self.time else self._intact
-        return self._present.settle(x)
+        return self._present.settle(x, offset=offset)
 
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
              clock: float = 0.0) -> float:

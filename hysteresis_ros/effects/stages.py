@@ -82,6 +82,10 @@ class MaterialEffect(Effect):
     # Excess length [m] of each parallel muscle.
     offsets: tuple[float, ...] = (0.0,)
 
+    def yields(self, surroundings: Surroundings) -> tuple[float, float]:
+        """Return the load [N] from which a muscle yields for good, and by how much then [m/N]."""
+        return math.inf, 0.0
+
     def shift_load(self, load: Values, surroundings: Surroundings) -> Values:
         """Return what is added to the load inside the transformation, in units of the load."""
         return 0.0 * load

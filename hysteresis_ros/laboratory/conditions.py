@@ -126,6 +126,9 @@ class Conditions:
         Of what is in series with each wire [m/N].
     wire_offsets : tuple of float
         By how much each wire is longer than the others [m]; one entry: the wires are alike.
+    yield_tension, yield_compliance : float
+        Tension from which a wire yields for good [N], and its residual elongation per tension
+        beyond [m/N].
     break_time : float
         When one of the wires breaks, since the recording began [s]; infinite: never.
     coulomb, viscous, inertia : float
@@ -161,6 +164,8 @@ class Conditions:
     dead_length: float = 0.0
     compliance: float = 0.0
     wire_offsets: tuple = (0.0,)
+    yield_tension: float = math.inf
+    yield_compliance: float = 0.0
     break_time: float = math.inf
     coulomb: float = 0.0
     viscous: float = 0.0

@@ -169,6 +169,11 @@ def _unequal_muscles(conditions: Conditions, size: float, specimen: np.random.Ge
     conditions.wire_offsets = (-0.004 * size, 0.0, 0.004 * size)
 
 
+def _overload(conditions: Conditions, size: float, specimen: np.random.Generator,
+              recording: np.random.Generator) -> None:
+    conditions.yield_tension, conditions.yield_compliance = 5.8, 0.006 * size
+
+
 def _wire_break(conditions: Conditions, size: float, specimen: np.random.Generator,
                 recording: np.random.Generator) -> None:
     # A wire is broken or it is not: where that shows little, it happens late.
@@ -316,6 +321,8 @@ LATER = {
                               'voltage, and a meter records it.', _measured_supply),
     'heat_loss': Effect('Still air takes heat off a hot wire faster than off a warm one (time '
                         'constant 4 s in the air of the bench).', _heat_loss),
+    'overload': Effect('The arm loads its wires beyond their yield stress, and they stay longer.',
+                       _overload),
 }
 
 # Here stood a torn wire while no catalogue had it.

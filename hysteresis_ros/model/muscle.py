@@ -8,14 +8,15 @@ import copy
 import dataclasses
 import math
 import os
-from collections.abc import Sequence
-from typing import Any, TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import Any, TYPE_CHECKING, TypeAlias, Union
 
 import numpy as np
 
 from hysteresis_ros.bicep.balance import ArmBalance
 from hysteresis_ros.bicep.breaking import BreakingBalance
 from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.bicep.yielding import YieldingBalance
 from hysteresis_ros.effects import Effect, Surroundings
 from hysteresis_ros.effects.base import Values
 from hysteresis_ros.effects.stages import Statics
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
     from hysteresis_ros.model.controller import Controller
     from hysteresis_ros.model.observer import Observer
+
+# The arm of a model, advanced by samples and by trials.
+Lifting: TypeAlias = Union[ArmBalance, BreakingBalance, YieldingBalance]
 
 # A wire cold enough to be fully martensite is one without drive.
 COLD_DRIVE = {'voltage': 0.0, 'current': 0.0, 'pressure': 0.0, 'power': 0.0}
@@ -214,12 +218,25 @@ class MuscleModel:
                 'length table with forces')
         return ArmBalance(stage, geometry, chain, loaded, statics, muscles)
 
-    def lifting(self, chain: Chain) -> ArmBalance | BreakingBalance:
-        """Return the same, or where a muscle breaks the balances before and after that."""
-        if chain.break_time == math.inf:
-            return self.balance(chain)
-        return BreakingBalance(self.balance(chain), self.balance(chain, muscles=self.remaining),
-                               chain.break_time)
+    def lifting(self, chain: Chain, balance: Callable[[int | None], ArmBalance] | None = None
+                ) -> Lifting:
+        """
+        Return the same with what happens to the muscles meanwhile: they yield, or one breaks.
+
+        Parameters
+        ----------
+        chain : Chain
+            Effects of the model.
+        balance : callable, optional
+            Returns the balance for a number of muscles, None for all.
+        """
+        make = balance or (lambda muscles: self.balance(chain, muscles=muscles))
+        intact = make(None)
+        arm: ArmBalance | BreakingBalance = intact
+        if chain.break_time < math.inf:
+            arm = BreakingBalance(intact, make(self.remaining), chain.break_time)
+        load, compliance = chain.yields
+        return arm if load == math.inf else YieldingBalance(arm, load, compliance)
 
     @property
     def remaining(self) -> int:

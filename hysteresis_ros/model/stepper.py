@@ -7,15 +7,13 @@ from __future__ import annotations
 import math
 from typing import Any, TYPE_CHECKING
 
-from hysteresis_ros.bicep.balance import ArmBalance
-from hysteresis_ros.bicep.breaking import BreakingBalance
 from hysteresis_ros.effects import Inputs
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.phase import agree
 
 if TYPE_CHECKING:
-    from hysteresis_ros.model.muscle import MuscleModel
+    from hysteresis_ros.model.muscle import Lifting, MuscleModel
 
 
 class Stepper:
@@ -33,12 +31,12 @@ class Stepper:
         Its effects.
     first : FirstStage
         Its first stage.
-    balance : ArmBalance or BreakingBalance
+    balance : ArmBalance, BreakingBalance or YieldingBalance
         The arm.
     """
 
     def __init__(self, model: MuscleModel, chain: Chain, first: FirstStage,
-                 balance: ArmBalance | BreakingBalance) -> None:
+                 balance: Lifting) -> None:
         self._model = model
         self._chain, self._first, self._balance = chain, first, balance
 
