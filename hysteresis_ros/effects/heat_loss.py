@@ -5,7 +5,6 @@
 import math
 
 import numpy as np
-from scipy import optimize
 
 from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.thermal import FASTEST, FirstOrderLag, LAGS
@@ -13,6 +12,8 @@ from hysteresis_ros.kernels.lag import approach, growing_lag
 
 # Share of the way that an input is taken to be good for, at least: it is finite in no time, too.
 LEAST_SHARE = 1e-3
+# An input is found to this share of the full drive squared, in so many trials at most.
+TOLERANCE, MOST_TRIALS = 1e-13, 100
 
 
 class HeatLoss(FirstOrderLag):
@@ -83,9 +84,23 @@ class HeatLoss(FirstOrderLag):
 
         def missing(value: float) -> float:
             return self._after(q, value, inputs.dt, surroundings) - signal
-        if missing(furthest) * missing(signal) >= 0.0:
+        near, far = signal, furthest
+        lacking, beyond = missing(near), missing(far)
+        if lacking * beyond >= 0.0:
             return furthest
-        return float(optimize.brentq(missing, signal, furthest, xtol=1e-12, rtol=1e-14))
+        # False position, where an end that stays counts half (the Illinois method).
+        value, enough = near, TOLERANCE * (surroundings.full_drive_squared or 1.0)
+        for _ in range(MOST_TRIALS):
+            value = near + (far - near) * lacking / (lacking - beyond)
+            error = missing(value)
+            if abs(error) <= enough:
+                break
+            if error * beyond < 0.0:
+                near, lacking = far, beyond
+            else:
+                lacking *= 0.5
+            far, beyond = value, error
+        return value
 
     def _after(self, q: float, value: float, dt: float, surroundings: Surroundings) -> float:
         rate = self.rate(True)
