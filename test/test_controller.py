@@ -19,7 +19,7 @@ TARGETS = np.radians(np.random.default_rng(3).uniform(82.0, 106.0, 20)).tolist()
 # Within reach with all effects at once, too.
 SOME = [1.75 + 0.3 * (target - 1.64) for target in TARGETS]
 INVERTIBLE = [name for name, effect in catalogue().items() if effect.invertible]
-LAGS = ('thermal_lag', 'heating_cooling_asymmetry', 'valve_lag')
+LAGS = ('thermal_lag', 'heating_cooling_asymmetry', 'heat_loss', 'valve_lag')
 # Their phase has to come into agreement first.
 PHASE = ('resistance_change', 'latent_heat')
 MANY = ('supply_sag', 'pwm_dead_zone', 'airflow', 'ambient_temperature', 'stress_dependence',
@@ -43,7 +43,7 @@ def drive_arm(model, targets=TARGETS, repeats=1, **options):
 def test_every_effect_that_can_be_undone_is_here():
     assert set(catalogue()) - set(INVERTIBLE) == {
         'ambient_drift', 'creep', 'viscoelastic_creep', 'viscous_friction', 'inertia', 'end_stop',
-        'latency'}
+        'wire_break', 'overload', 'latency'}
 
 
 @pytest.mark.parametrize('names', [(), *((name,) for name in INVERTIBLE if name not in PHASE),

@@ -27,6 +27,8 @@ EXPECTED = {
     'thermal_lag': ('thermal', 'time since a step', 'several rates',
                     {'latency', 'viscous_friction', 'creep'}),
     'heating_cooling_asymmetry': ('thermal', 'sign of dV/dt', 'up and down', {'thermal_lag'}),
+    'heat_loss': ('thermal', 'where it begins', 'half of it',
+                  {'thermal_lag', 'heating_cooling_asymmetry'}),
     'valve_lag': ('thermal', 'time since a step', 'up and down', {'creep', 'latency'}),
     'latent_heat': ('thermal', 'inside the loop', 'small steps', {'thermal_lag'}),
     'ambient_temperature': ('thermal', 'ambient', 'log the ambient', {'ambient_drift'}),
@@ -45,11 +47,15 @@ EXPECTED = {
     'series_compliance': ('material', 'force', 'weights', {'payload_error', 'geometry_error'}),
     'transformation_slopes': ('material', "loop's width", 'three or more loads',
                               {'stress_dependence', 'r_phase'}),
+    'overload': ('material', 'first time', 'step by step',
+                 {'slack', 'series_compliance', 'fatigue'}),
     'unequal_muscles': ('material', 'smeared knees', 'one muscle at a time',
                         {'slack', 'geometry_error'}),
     'coulomb_friction': ('mechanism', 'reversals', 'tap', {'backlash'}),
     'cable_friction': ('mechanism', 'in proportion to the load', 'another payload',
                        {'coulomb_friction', 'backlash'}),
+    'wire_break': ('mechanism', 'one moment', 'look at the muscles',
+                   {'fatigue', 'payload_error', 'slack'}),
     'viscous_friction': ('mechanism', 'dtheta/dt', 'swing', {'thermal_lag', 'latency'}),
     'inertia': ('mechanism', 'ringing', 'pluck', {'viscous_friction'}),
     'payload_error': ('mechanism', 'gravity curve', 'scale', {'frame_tilt', 'supply_sag'}),
@@ -71,12 +77,15 @@ RANGES = {
     ('measured_supply', 'nominal'): ('V', 3.0, 60.0),
     ('thermal_lag', 'time_constant'): ('s', 0.05, 100.0),
     ('valve_lag', 'filling'): ('s', 0.05, 100.0), ('valve_lag', 'venting'): ('s', 0.05, 100.0),
+    ('heat_loss', 'growth'): ('1', 0.05, 1.5),
     ('heating_cooling_asymmetry', 'ratio'): ('1', 0.5, 2.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
     ('viscoelastic_creep', 'J'): ('% of l0', 0.01, 2.0),
     ('creep', 'c'): ('% of l0', 0.01, 0.5), ('slack', 'Ls'): ('mm', 0.1, 5.0),
     ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),
     ('coulomb_friction', 'tau_c'): ('N m', 0.001, 0.150),
     ('cable_friction', 'mu_phi'): ('1', 0.005, 1.0),
+    ('overload', 'Fy'): ('loads', 0.2, 5.0), ('overload', 'compliance'): ('mm/N', 0.1, 20.0),
+    ('wire_break', 'time'): ('s', 1.0, 1e5),
     ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 5., 100.),
     # A clamp of 50 g, too: the base model's own error alone may look like 10 g.
     ('clamp_mass', 'moment'): ('g m', 5.0 * 0.020, 50.0 * 0.050),
@@ -154,7 +163,7 @@ def test_every_effect_changes_what_an_arm_run_shows(name):
 def test_implausible_values_are_named_but_neutral_ones_are_not():
     model = bicep_model()
     assert effect_of(model, 'fatigue', a=0.4).implausible() == ['a']
-    assert effect_of(model, 'fatigue', a=-0.1).implausible() == ['a']
+    assert effect_of(model, 'fatigue', a=-0.4).implausible() == ['a']
     assert effect_of(model, 'encoder_offset', offset=-3.0).implausible() == []
     assert effect_of(model, 'end_stop', stop=1.0, side=0.5, stiffness=1.0).implausible() == ['side']
 

@@ -155,6 +155,13 @@ def test_an_old_muscle_wears_more_slowly_than_a_new_one():
         np.testing.assert_allclose(factor, 1.0 - 0.02 * logarithm)
 
 
+def test_training_makes_the_stroke_grow():
+    made = effect('fatigue', b=-0.1, a=-0.05)
+    offset, factor = made.drift(np.zeros(2), np.zeros(2), inputs([1, 2], [0.0, 9.0]), WIRE)
+    assert factor[1] == pytest.approx(1.0 + 0.05 * np.log(10.0)) and offset[1] > 0.0
+    assert made.implausible() == []
+
+
 def test_wear_is_not_carried_over_where_it_could_be_the_load():
     worn = effect('fatigue', b=0.1).within_trials()
     kept = next(parameter for parameter in worn.parameters if parameter.name == 'kept')

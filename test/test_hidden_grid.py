@@ -55,8 +55,8 @@ def test_truth_of_the_most_probable_set(scores):
     sets = [(['slack'], 0.3), (['creep', 'slack'], 0.6), (['unknown'], 0.1)]
     assert scores.most_probable(result('pair', ['slack', 'creep'], sets)) == (0.6, True)
     assert scores.most_probable(result('strong', ['slack'], sets)) == (0.6, False)
-    for group, truth, right in (('none', [], []), ('unknown', ['unlisted_torn_wire'], ['unknown'])):
-        for effects in ([], ['unknown'], ['unlisted_torn_wire']):
+    for group, truth, right in (('none', [], []), ('unknown', ['unlisted_magnet'], ['unknown'])):
+        for effects in ([], ['unknown'], ['unlisted_magnet']):
             row = result(group, truth, [(effects, 0.9), (['creep'], 0.1)])
             assert scores.most_probable(row) == (0.9, effects == right)
 

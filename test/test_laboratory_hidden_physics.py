@@ -23,7 +23,8 @@ CATALOGUE = (
     'ambient_temperature ambient_drift airflow stress_dependence stress_dependent_strain r_phase '
     'creep fatigue slack series_compliance unequal_muscles coulomb_friction viscous_friction '
     'inertia payload_error clamp_mass geometry_error frame_tilt end_stop encoder_offset backlash '
-    'latency cable_friction encoder_eccentricity measured_supply').split()
+    'latency cable_friction encoder_eccentricity measured_supply heat_loss wire_break '
+    'overload').split()
 MIDDLE = 4.1
 
 
@@ -231,6 +232,19 @@ def test_fatigue_counts_cycles():
     assert arm.angle == pytest.approx(tired, abs=0.02)
     assert tired < calm().angle - 0.08
     assert Plant(0, {'fatigue': 1.0}).arm.muscle.cycles == 0.0
+
+
+def test_training_gains_stroke_cycle_by_cycle():
+    """The wire gets longer when cold, and by more than that of its stroke."""
+    arm = Plant(0, {'fatigue': -1.0}).arm
+    strokes, cold = [], []
+    for _ in range(10):
+        arm.settle(30.0, 6.0)
+        hot = arm.angle
+        arm.settle(30.0, 0.0)
+        strokes.append(arm.angle - hot)
+        cold.append(arm.angle)
+    assert cold[-1] > cold[0] + 0.03 and strokes[-1] > strokes[0] + 0.02
 
 
 def test_unequal_wires_share_the_load():

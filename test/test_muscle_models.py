@@ -225,7 +225,7 @@ def test_every_effect_acts_or_is_refused(muscle):
         angle = plant.arm_trial(voltages)['angle']
         assert np.all(np.isfinite(angle))
         if name not in ('thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'inertia',
-                        'viscous_friction', 'latency', 'unlisted_torn_wire',
+                        'heat_loss', 'viscous_friction', 'latency',
                         'unlisted_slipping_crimp', 'unlisted_water_drops', 'creep'):
             assert np.abs(angle - clean).max() > math.radians(0.2), name
 

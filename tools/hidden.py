@@ -25,7 +25,7 @@ import numpy as np
 FIRST_SEED = 1000
 STRENGTHS = {'strong': 1.0, 'weak': 0.4}
 # Effects that only transients can show are hidden in continuous recordings, others in settled ones.
-TRANSIENT = {'thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'creep',
+TRANSIENT = {'thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'heat_loss', 'creep',
              'viscous_friction', 'inertia', 'latency', 'ambient_drift', 'fatigue'}
 # Most probable sets of each case that are written.
 SETS_WRITTEN = 5

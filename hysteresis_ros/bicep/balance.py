@@ -21,7 +21,7 @@ from hysteresis_ros.bicep.geometry import BicepGeometry
 from hysteresis_ros.bicep.wires import kernels_for, wires_of, with_own_memories
 from hysteresis_ros.effects.stages import Statics
 from hysteresis_ros.kernels import trial
-from hysteresis_ros.kernels.arm import Arm, MOTION, State
+from hysteresis_ros.kernels.arm import Arm, MOTION, State, X
 from hysteresis_ros.operators import HysteresisOperator
 
 if TYPE_CHECKING:
@@ -57,10 +57,13 @@ class ArmBalance:
         Whether the load counts; not in a model without a first stage to weigh it against.
     statics : Statics, optional
         The arm that the geometry describes at rest, where it was computed before.
+    muscles : int, optional
+        How many muscles carry the load; by default those of the geometry.
     """
 
     def __init__(self, operator: HysteresisOperator, geometry: BicepGeometry, chain: Chain,
-                 loaded: bool = True, statics: Statics | None = None) -> None:
+                 loaded: bool = True, statics: Statics | None = None, muscles: int | None = None
+                 ) -> None:
         statics = statics or statics_of(geometry)
         for effect in chain.mechanism:
             statics = effect.forward(statics, geometry)
@@ -69,7 +72,7 @@ class ArmBalance:
             float(sum(values)) for values in zip((0.0, 0.0, 0.0), *resistances))
         self.capstan = float(sum(effect.capstan() for effect in chain.mechanism))
         sticks = self.coulomb > 0.0 or self.capstan > 0.0
-        leverage = geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6)
+        leverage = (muscles or geometry.muscle_count) * np.maximum(statics.moment_arm, 1e-6)
         # What the arm gets of a tension while it sinks; its inverse while it rises.
         grip = math.exp(self.capstan)
         self.base = operator.output_range[0]
@@ -78,6 +81,7 @@ class ArmBalance:
         self.span = operator.upper - operator.lower
         several = len(chain.offsets) > 1
         wires, self.operators, memories = wires_of(operator, chain, loaded)
+        self._held = statics.theta, statics.moment, leverage
         # At rest, and where the arm sinks and rises against dry friction.
         senses = (0, 1, -1) if sticks else (0,)
         lines = [_line(statics, leverage * grip ** sense, sense * self.coulomb, self.base, chain,
@@ -124,6 +128,12 @@ class ArmBalance:
             operator.rewind(memory)
         self._state.motion[:], self._state.loads[:] = motion, loads
 
+    def take_over(self, other: ArmBalance) -> None:
+        """Go on from the state of another arm, whose load may have been another."""
+        self.rewind(other.snapshot())
+        # No x was the last one here: what changes at once makes the arm ring.
+        self._state.motion[X] = np.inf
+
     def start(self) -> None:
         """Wipe the memory: after a full heat and cool cycle, before the first sample."""
         self._kernels.start(self._arm, self._state)
@@ -133,12 +143,18 @@ class ArmBalance:
         """Output of H2 [m], which follows the martensite share; the mean of the muscles."""
         return self._kernels.output(self._arm, self._state)
 
-    def settle(self, x: float) -> float:
+    def load(self, angle: float) -> float:
+        """Return the load [N] of each muscle that holds the arm at rest at an angle [rad]."""
+        theta, moment, leverage = self._held
+        return float(np.interp(angle, theta, np.maximum(moment, 0.0) / leverage))
+
+    def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
         """Wipe the memory, take up the state of rest under `x`, and return its angle [rad]."""
         self.start()
-        return self.step(x, math.inf)
+        return self.step(x, math.inf, offset)
 
-    def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0) -> float:
+    def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
+             clock: float = 0.0) -> float:
         """
         Advance to the next sample.
 
@@ -150,6 +166,8 @@ class ArmBalance:
             Time since the sample before [s].
         offset, factor : float
             What time and use add to the elongation [m] and do to the stroke.
+        clock : float
+            Time since the recording began [s]; it counts where a muscle breaks (`breaking`).
 
         Returns
         -------
@@ -160,7 +178,8 @@ class ArmBalance:
                                   float(factor))
 
     def run(self, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
-            factor: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
+            factor: np.ndarray, clock: np.ndarray | None = None
+            ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """
         Run whole trials, each from the cold state.
 
@@ -170,7 +189,7 @@ class ArmBalance:
             Output of the first stage in the cold state.
         ends : ndarray of int, shape (trials,)
             Where each trial ends and the next begins.
-        x, dt, offset, factor : ndarray, shape (rows,)
+        x, dt, offset, factor, clock : ndarray, shape (rows,)
             As for `step`, for the rows of all trials.
 
         Returns
@@ -181,6 +200,12 @@ class ArmBalance:
             Angle [rad], output of H2 [m], and input of the first muscle's H2.
         """
         return self._kernels.run(self._arm, self._state, float(cold), ends, *(
+            np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))
+
+    def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray
+                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Go on from the present state; angles, outputs and inputs (rows,) as of `run`."""
+        return self._kernels.proceed(self._arm, self._state, *(
             np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))
 
 

@@ -410,11 +410,10 @@ class Fitter:
             held_out = fit.predicted.copy()
             for index, fold in enumerate(folds if len(fit.vector) else ()):
                 test = self.problem.fold == fold
-                error = [np.mean((self.problem.measured - one)[~test] ** 2) for one in
-                         (*responses[2 * index:2 * index + 2], fit.predicted)]
-                chosen = int(np.nanargmin(error))
-                one = (*responses[2 * index:2 * index + 2], fit.predicted)[chosen]
-                held_out[test] = one[test]
+                # No step comes first: of the time of an event in rows held out, others say nothing.
+                tried = (fit.predicted, *responses[2 * index:2 * index + 2])
+                error = [np.mean((self.problem.measured - one)[~test] ** 2) for one in tried]
+                held_out[test] = tried[int(np.nanargmin(error))][test]
             found.append(dataclasses.replace(fit, held_out=held_out))
         return found
 

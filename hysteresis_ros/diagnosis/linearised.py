@@ -77,7 +77,8 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[St
     starts = []
     for name in names:
         effect = present(problem.model, catalogue()[name])
-        starts += starts_of(effect, problem.kind, problem.measured)
+        starts += starts_of(effect, problem.kind, problem.measured,
+                            residual=problem.measured - fit.predicted, clock=problem.own_clock)
         if name in own:
             # What the bench says of it is as good a start as any.
             starts.append(own[name])

@@ -97,12 +97,13 @@ def _from_unit(parameter: Parameter, value: float) -> float:
 
 
 def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
-              most: int = 14) -> list[Effect]:
+              most: int = 14, residual: np.ndarray | None = None,
+              clock: np.ndarray | None = None) -> list[Effect]:
     """
     Return copies of `effect` at the values from which a fit may start.
 
     All combinations of the starts of its parameters, thinned evenly to at most `most`, and what
-    the response, where it is given, suggests.
+    the response and the residual, where they are given, suggest.
 
     Parameters
     ----------
@@ -112,7 +113,9 @@ def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
     measured : ndarray, shape (n,), optional
         The response.
     most : int
-        Combinations, without those that the response suggests.
+        Combinations, without those that are suggested.
+    residual, clock : ndarray, shape (n,), optional
+        What is not explained without the effect, and since when its recording runs [s].
 
     Returns
     -------
@@ -128,6 +131,8 @@ def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
                                     for parameter, value in zip(fitted, combination)})
               for combination in combinations]
     guesses = [] if measured is None else effect.guesses(measured)
+    if residual is not None and clock is not None:
+        guesses = [*guesses, *effect.moments(residual, clock)]
     return starts + [starts[0].with_values(**guess) for guess in guesses]
 
 

@@ -56,8 +56,8 @@ class Problem:
         Standard deviation that the sensor's resolution causes, in the unit of the response.
     largest_noise : float
         Standard deviation that white noise can have at most, as all rows show it.
-    clock : ndarray, shape (n,)
-        Time of each row since the first recording began [s].
+    clock, own_clock : ndarray, shape (n,)
+        Time of each row since the first recording began, and since its own did [s].
     trial, fold, block : ndarray of int, shape (n,)
         Which trial a row is of, which rows are held out together, and which count as one in the
         significance.
@@ -155,6 +155,7 @@ class Problem:
         signals = {name: self.pick(values) for name, values in columns.items()}
         # Recordings follow each other; each begins its clock anew.
         ends = np.cumsum([0.0] + [s.trials[-1].inputs.clock[-1] for s in self.simulators])
+        self.own_clock = signals['clock']
         self.clock = signals['clock'] + np.repeat(ends[:-1], [len(rows) for rows in self.chosen])
         return {name: values for name, values in signals.items()
                 if np.all(np.isfinite(values)) and np.ptp(values) > 0.0}

@@ -204,12 +204,18 @@ class Selection:
             If no start can be simulated.
         """
         others = [one for one in fit.effects if one.id not in effect.replaces]
-        starts = [*starts_of(effect, self.problem.kind, self.problem.measured), effect]
+        starts = [*self._starts_of(effect, fit), effect]
         found = self.fitter.fit([[*others, start] for start in starts], self._metric(),
                                 FIRST_STEPS, exact=False)
         found.sort(key=lambda one: -one.log_evidence)
         found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
         return self.fitter.refined(max(found, key=lambda one: one.log_evidence))
+
+    def _starts_of(self, effect: Effect, fit: Fit) -> list[Effect]:
+        """Return where to start an effect together with those of a fit."""
+        problem = self.problem
+        return starts_of(effect, problem.kind, problem.measured,
+                         residual=problem.measured - fit.predicted, clock=problem.own_clock)
 
     def _linearised_with(self, names: frozenset[str]) -> Linearised:
         """Return all other effects, linearised at the values that those of a set have."""
@@ -252,8 +258,7 @@ class Selection:
         starts: list[tuple[Effect, ...]] = []
         for names in probable[:self.settings.refits]:
             starts += itertools.product(*(
-                starts_of(effect, self.problem.kind, self.problem.measured)
-                for effect in self.fits[names].effects))
+                self._starts_of(effect, self.base) for effect in self.fits[names].effects))
         self._begin(starts)
         self._refine(size)
 

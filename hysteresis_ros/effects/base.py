@@ -125,7 +125,8 @@ class Surroundings(NamedTuple):
     and `response` what they are. `cold` is the drive that every trial starts from, `drive_range`
     the width of the range seen, and `sign` is -1 for a muscle that gets shorter when driven, 1 for
     one that gets longer. `rest_load` is the load under which the cold muscle has its resting
-    length, and `least` the response of H2 where it has transformed altogether.
+    length, and `least` the response of H2 where it has transformed altogether. `muscles` is the
+    number of parallel muscles that lift the arm, 1 without an arm.
     """
 
     length: float
@@ -140,6 +141,7 @@ class Surroundings(NamedTuple):
     sign: int = -1
     rest_load: float = 0.0
     least: float = 0.0
+    muscles: int = 1
 
 
 class Effect(abc.ABC):
@@ -276,6 +278,10 @@ class Effect(abc.ABC):
 
     def guesses(self, measured: np.ndarray) -> list[dict]:
         """Return values by name that the measured response (n,) suggests to start a fit from."""
+        return []
+
+    def moments(self, residual: np.ndarray, clock: np.ndarray) -> list[dict]:
+        """Return values by name that a residual (n,) at times (n,) [s] suggests to start from."""
         return []
 
     @classmethod

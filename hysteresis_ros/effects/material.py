@@ -364,14 +364,19 @@ class Creep(MaterialEffect):
 
 
 class Fatigue(MaterialEffect):
-    """Cycle after cycle the muscle gets shorter, or longer, and loses stroke."""
+    """
+    Cycle after cycle the muscle gets shorter or longer, and loses or gains stroke.
+
+    A new muscle gains it while it is trained, an old one loses it; both slow down alike.
+    """
 
     id = 'fatigue'
     sentence = ('With every cycle the muscle gets a little shorter (b > 0) or longer (b < 0), and '
-                'loses stroke.')
+                'loses stroke, or gains it in training (a < 0).')
     equation = ('L -= b l0 w, stroke times (1 - a w), w = ln(1 + N / N0), N the cycles of the '
                 'recording: ln(1 + (N + Nb) / N1) against its start, N0 = N1 + Nb')
-    source = 'functional fatigue and training of shape memory alloys'
+    source = ('functional fatigue and training of shape memory alloys (Lagoudas (ed.), Shape '
+              'Memory Alloys, Springer 2008, ch. 1); the logarithm is empirical')
     shows_in = 'cycle count'
     experiment = 'repeat a reference loop and compare the first with the last'
     confused_with = ('ambient_drift',)
@@ -380,8 +385,8 @@ class Fatigue(MaterialEffect):
         Parameter('b', '% of l0', 'drift per factor e of the number of cycles, positive where '
                   'the muscle gets shorter', 0.0, 0.5, 0.0,
                   (0.05, -0.05), both_signs=True),
-        Parameter('a', '1', 'loss of stroke per factor e of the number of cycles', 0.0, 0.3, 0.0,
-                  (0.03,)),
+        Parameter('a', '1', 'loss of stroke per factor e of the number of cycles, negative where '
+                  'training makes it grow', 0.0, 0.3, 0.0, (0.03,), both_signs=True),
         Parameter('N0', '1', 'cycles before the recording, and those of the first wear: an old '
                   'muscle wears more slowly than a new one', 1.0, 1e5, 1.0, (1.0,), log=True,
                   limits=(1.0, 1e5), kinds=()),

@@ -82,6 +82,10 @@ class MaterialEffect(Effect):
     # Excess length [m] of each parallel muscle.
     offsets: tuple[float, ...] = (0.0,)
 
+    def yields(self, surroundings: Surroundings) -> tuple[float, float]:
+        """Return the load [N] from which a muscle yields for good, and by how much then [m/N]."""
+        return math.inf, 0.0
+
     def shift_load(self, load: Values, surroundings: Surroundings) -> Values:
         """Return what is added to the load inside the transformation, in units of the load."""
         return 0.0 * load
@@ -168,6 +172,8 @@ class MechanismEffect(Effect):
     """Effect on the arm: what it asks of the muscle at rest, and what resists its motion."""
 
     stage = 'mechanism'
+    # When one of the muscles breaks, since the recording began [s].
+    break_time: float = math.inf
 
     def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Return the arm at rest with the effect; by default unchanged."""

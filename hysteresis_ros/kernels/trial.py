@@ -134,6 +134,19 @@ def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor:
 
 
 @jit
+def proceed(arm: Arm, state: State, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
+            factor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Go on from the present state: as `run`, within one trial."""
+    rows = len(x)
+    angles, outputs, inputs = np.empty(rows), np.empty(rows), np.empty(rows)
+    for n in range(rows):
+        angles[n] = step(arm, state, x[n], dt[n], offset[n], factor[n])
+        outputs[n] = output(arm, state)
+        inputs[n] = last_input(arm.wires.table, state.memories[0])
+    return angles, outputs, inputs
+
+
+@jit
 def run(arm: Arm, state: State, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray,
         offset: np.ndarray, factor: np.ndarray
         ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:

@@ -81,7 +81,7 @@ class Arm:
         """Take over from the conditions what is kept elsewhere."""
         conditions = self.conditions
         coupled = (conditions.heat.latent or conditions.resistance_growth or conditions.viscous
-                   or conditions.disturbances or conditions.creep)
+                   or conditions.disturbances or conditions.creep or conditions.yield_compliance)
         self._settling_dt = SETTLING_DT if coupled else math.inf
         for wire in self.muscle.wires:
             wire.compliance = conditions.compliance
@@ -176,6 +176,8 @@ class Arm:
             self._change()
             self._change = None
             self._adapt()
+        if self.time > conditions.break_time:
+            self.muscle.count = conditions.linkage.muscle_count - 1
         air = conditions.air
         kept = math.exp(-dt / air.turbulence_time)
         self._fluctuation = kept * self._fluctuation + (

@@ -214,7 +214,7 @@ class BrinsonWire(Wire):
 
     def _strain(self, shares: Shares, temperature: float, stress: float) -> float:
         material, oriented, martensite = self.material, shares.oriented, shares.martensite
-        if self.retained > 0.0:
+        if self.retained != 0.0:
             oriented = self.retained + (1.0 - self.retained) * oriented
             martensite = self.retained + (1.0 - self.retained) * martensite
         modulus = material.austenite_modulus + martensite * (

@@ -117,15 +117,20 @@ class Conditions:
     creep_time : float
         Time from which that logarithm counts [s].
     shrinkage : float
-        Share of the resting length that a wire loses per factor e of cycles.
+        Share of the resting length that a wire loses per factor e of cycles; negative in training.
     tiring : float
-        Share of the grains that stay martensite per factor e of cycles.
+        Share of the grains that stay martensite per factor e of cycles; negative in training.
     dead_length : float
         Length of each wire that hangs loose [m].
     compliance : float
         Of what is in series with each wire [m/N].
     wire_offsets : tuple of float
         By how much each wire is longer than the others [m]; one entry: the wires are alike.
+    yield_tension, yield_compliance : float
+        Tension from which a wire yields for good [N], and its residual elongation per tension
+        beyond [m/N].
+    break_time : float
+        When one of the wires breaks, since the recording began [s]; infinite: never.
     coulomb, viscous, inertia : float
         Friction [N m], damping [N m s/rad] and moment of inertia [kg m^2]; no inertia: the arm
         follows at once.
@@ -159,6 +164,9 @@ class Conditions:
     dead_length: float = 0.0
     compliance: float = 0.0
     wire_offsets: tuple = (0.0,)
+    yield_tension: float = math.inf
+    yield_compliance: float = 0.0
+    break_time: float = math.inf
     coulomb: float = 0.0
     viscous: float = 0.0
     inertia: float = 0.0

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 
 from hysteresis_ros.laboratory.solve import RootFinder
+from hysteresis_ros.laboratory.still_air import StillAir
 
 # d2 / d1 with the bench's fan [K/V^2], and the room's temperature [degC].
 GAIN = 2.7
@@ -38,6 +39,8 @@ class HeatBalance:
         d1 while heating over d1 while cooling, for the way to the balance, not for the balance.
     latent : float
         Heat that the whole transformation takes up, over the specific heat [K].
+    air : StillAir or None
+        Loses the heat, where the heat transfer depends on the temperature.
     """
 
     time_constant: float = 5.0
@@ -45,6 +48,7 @@ class HeatBalance:
     airflow: float = 1.0
     heating_ratio: float = 1.0
     latent: float = 0.0
+    air: StillAir | None = None
 
     def balance(self, drive_squared: float, room: float, airflow: float = 1.0) -> float:
         """
@@ -64,7 +68,7 @@ class HeatBalance:
     def advance(self, temperature: float, balance: float, dt: float, airflow: float = 1.0,
                 share: Callable[[float], float] | None = None, before: float = 0.0) -> float:
         """
-        Return the temperature [degC] after `dt`, exact for a constant balance.
+        Return the temperature [degC] after `dt` of a constant balance.
 
         Parameters
         ----------
@@ -83,6 +87,8 @@ class HeatBalance:
         if balance > temperature:
             rate *= self.heating_ratio
         change = (balance - temperature) * (1.0 - math.exp(-rate * dt))
+        if self.air is not None:
+            change = self.air.change(temperature - ROOM, balance - ROOM, rate, dt)
         if self.latent == 0.0 or share is None or abs(change) < 1e-9:
             return temperature + change
         # The heat that came in is shared by warming and transforming: the temperature gets the part

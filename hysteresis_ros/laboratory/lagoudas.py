@@ -225,7 +225,7 @@ class LagoudasWire(Wire):
         return share, strain
 
     def _strain(self, share: float, transformation: float, stress: float) -> float:
-        if self.retained > 0.0:
+        if self.retained != 0.0:
             share = self.retained + (1.0 - self.retained) * share
             transformation = (1.0 - self.retained) * transformation + (
                 self.retained * self.material.strain_of_new_martensite(stress))

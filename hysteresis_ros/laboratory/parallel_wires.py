@@ -36,6 +36,7 @@ class ParallelWires:
         self.wires = [conditions.material.wire() for _ in conditions.wire_offsets]
         self.count = conditions.linkage.muscle_count
         self.cycles = 0.0
+        self._largest = 0.0
         for wire in self.wires:
             wire.compliance = conditions.compliance
         self.heat_and_cool()
@@ -96,6 +97,7 @@ class ParallelWires:
         """Bring the wires to a temperature [degC] and tensions [N], and count the travel."""
         for wire, tension in zip(self.wires, tensions):
             wire.commit(temperature, tension)
+        self._largest = max(self._largest, *tensions)
         share = self.martensite
         self.cycles += 0.5 * abs(share - self._share)
         self._share = share
@@ -116,9 +118,10 @@ class ParallelWires:
         conditions = self._conditions
         if conditions.creep > 0.0:
             self._creep_on(voltage, dt)
-        if conditions.tiring > 0.0:
+        if conditions.tiring != 0.0:
             for wire in self.wires:
-                wire.retained = min(conditions.tiring * math.log1p(self.cycles), 0.8)
+                retained = conditions.tiring * math.log1p(self.cycles)
+                wire.retained = min(max(retained, -0.8), 0.8)
         self._extra = extra
         self._set_excess()
 
@@ -144,5 +147,7 @@ class ParallelWires:
         common = conditions.dead_length + self._creep + self._left_creep + self._extra
         common -= (conditions.shrinkage * conditions.material.resting_length
                    * math.log1p(self.cycles))
+        common += conditions.yield_compliance * max(
+            self._largest - conditions.yield_tension, 0.0)
         for wire, offset in zip(self.wires, conditions.wire_offsets):
             wire.excess = common + offset

@@ -201,18 +201,6 @@ class EccentricDisc(Unlisted):
         return math.radians(4.5) * self.size * math.sin(self._waves * theta + self._phase)
 
 
-class TornWire(Unlisted):
-    """One of the wires tears at some moment; the others carry its load."""
-
-    def prepare(self, specimen: np.random.Generator, recording: np.random.Generator) -> None:
-        """Draw the moment."""
-        self._moment = recording.uniform(0.35, 0.65) * self.duration
-
-    def moment(self, time: float, theta: float) -> float:
-        """Ask as much of the remaining wires as all of them had to give."""
-        return 0.5 * self.size * self.linkage.moment(theta) if time > self._moment else 0.0
-
-
 class FlexedLead(Unlisted):
     """A lead breaks strand by strand: raising the arm flexes it, and less voltage arrives."""
 
@@ -249,7 +237,6 @@ UNLISTED = {
     'unlisted_loose_set_screw': LooseSetScrew,
     'unlisted_periodic_draught': PeriodicDraught,
     'unlisted_eccentric_disc': EccentricDisc,
-    'unlisted_torn_wire': TornWire,
     'unlisted_flexed_lead': FlexedLead,
     'unlisted_water_drops': WaterDrops,
 }

@@ -101,7 +101,8 @@ class Wire(abc.ABC):
     Attributes
     ----------
     retained : float
-        Share of the wire that stays martensite for good, as use makes it.
+        Share of the wire that stays martensite for good, as use makes it; negative where training
+        lets it recover more than when it was new.
     excess : float
         Length that the wire has beyond its elongation: dead length, creep [m].
     compliance : float

@@ -89,6 +89,23 @@ class Chain:
         return any(effect.moves for effect in self.mechanism)
 
     @property
+    def meanwhile(self) -> list[Effect]:
+        """Effects of what happens to the arm's muscles while it runs: they break, or yield."""
+        return [*(effect for effect in self.mechanism if effect.break_time < math.inf),
+                *(one for one in self.material if one.yields(self.surroundings)[0] < math.inf)]
+
+    @property
+    def break_time(self) -> float:
+        """When one of the muscles breaks first, since the recording began [s]."""
+        return min((effect.break_time for effect in self.mechanism), default=math.inf)
+
+    @property
+    def yields(self) -> tuple[float, float]:
+        """Load [N] from which the muscle yields for good, infinite if never, and 1 / K [m/N]."""
+        return min((effect.yields(self.surroundings) for effect in self.material),
+                   default=(math.inf, 0.0))
+
+    @property
     def drifts(self) -> bool:
         """Whether time or history add to the elongation."""
         return bool(self.drifting)

@@ -6,14 +6,17 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import math
 import os
-from collections.abc import Sequence
-from typing import Any, TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import Any, TYPE_CHECKING, TypeAlias, Union
 
 import numpy as np
 
 from hysteresis_ros.bicep.balance import ArmBalance
+from hysteresis_ros.bicep.breaking import BreakingBalance
 from hysteresis_ros.bicep.geometry import BicepGeometry
+from hysteresis_ros.bicep.yielding import YieldingBalance
 from hysteresis_ros.effects import Effect, Surroundings
 from hysteresis_ros.effects.base import Values
 from hysteresis_ros.effects.stages import Statics
@@ -27,6 +30,9 @@ if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
     from hysteresis_ros.model.controller import Controller
     from hysteresis_ros.model.observer import Observer
+
+# The arm of a model, advanced by samples and by trials.
+Lifting: TypeAlias = Union[ArmBalance, BreakingBalance, YieldingBalance]
 
 # A wire cold enough to be fully martensite is one without drive.
 COLD_DRIVE = {'voltage': 0.0, 'current': 0.0, 'pressure': 0.0, 'power': 0.0}
@@ -108,7 +114,8 @@ class MuscleModel:
         least = self.length_stage.output_range[0] if self.length_stage is not None else 0.0
         return Surroundings(length, self.mean_load, float(bare.to_drive_squared(largest)), span,
                             self.drive, self.load_name, self.response, self.cold_drive,
-                            self.drive_range, self.sign, rest_load, least)
+                            self.drive_range, self.sign, rest_load, least,
+                            int(self.geometry.muscle_count) if self.geometry else 1)
 
     def with_effects(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return a copy with other effects and the same operators."""
@@ -179,7 +186,8 @@ class MuscleModel:
         from hysteresis_ros.model.observer import Observer
         return Observer(self)
 
-    def balance(self, chain: Chain, statics: Statics | None = None) -> ArmBalance:
+    def balance(self, chain: Chain, statics: Statics | None = None, muscles: int | None = None
+                ) -> ArmBalance:
         """
         Return the balance between the muscle, its memory wiped, and the arm.
 
@@ -189,6 +197,8 @@ class MuscleModel:
             Effects of the model.
         statics : Statics, optional
             The arm that the geometry describes at rest, where it was computed before.
+        muscles : int, optional
+            How many muscles carry the load; by default those of the geometry.
 
         Raises
         ------
@@ -206,7 +216,32 @@ class MuscleModel:
             raise ParameterError(
                 f'the model gives {self.response} under {self.load_name}; the bicep needs a '
                 'length table with forces')
-        return ArmBalance(stage, geometry, chain, loaded, statics)
+        return ArmBalance(stage, geometry, chain, loaded, statics, muscles)
+
+    def lifting(self, chain: Chain, balance: Callable[[int | None], ArmBalance] | None = None
+                ) -> Lifting:
+        """
+        Return the same with what happens to the muscles meanwhile: they yield, or one breaks.
+
+        Parameters
+        ----------
+        chain : Chain
+            Effects of the model.
+        balance : callable, optional
+            Returns the balance for a number of muscles, None for all.
+        """
+        make = balance or (lambda muscles: self.balance(chain, muscles=muscles))
+        intact = make(None)
+        arm: ArmBalance | BreakingBalance = intact
+        if chain.break_time < math.inf:
+            arm = BreakingBalance(intact, make(self.remaining), chain.break_time)
+        load, compliance = chain.yields
+        return arm if load == math.inf else YieldingBalance(arm, load, compliance)
+
+    @property
+    def remaining(self) -> int:
+        """How many muscles lift the arm after one has broken; the last one does not break."""
+        return max(int(self.require_geometry().muscle_count) - 1, 1)
 
     def require_geometry(self) -> BicepGeometry:
         """Return the arm's geometry; ParameterError if the model has none."""

@@ -41,8 +41,9 @@ class Observer:
         self.model = model
         self._chain = model.chain()
         self._arm = Stepper(
-            model, self._chain, model.first_stage(self._chain), model.balance(self._chain))
+            model, self._chain, model.first_stage(self._chain), model.lifting(self._chain))
         self._travel = 0.0
+        self._time: float | None = None
         self.reset()
 
     def reset(self, time: float | None = None) -> None:
@@ -54,7 +55,7 @@ class Observer:
         time : float, optional
             When it begins [s]; by default with the first sample.
         """
-        rest = self._arm.start()
+        rest = self._arm.start((self._time or 0.0) if time is None else time)
         for effect in self._chain.sensor:
             effect.begin(rest)
         self._time = time

@@ -24,7 +24,7 @@ from hysteresis_ros.operators import HysteresisOperator
 
 if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
-    from hysteresis_ros.model.muscle import MuscleModel
+    from hysteresis_ros.model.muscle import Lifting, MuscleModel
 
 # Rows of a settled table without times are this far apart [s] (Sec. III-A).
 HOLD = 30.0
@@ -195,14 +195,20 @@ class Simulator:
         if chain.needs_phase:
             known = self._phases.get(tuple(effect.id for effect in effects), self._latest)
             found = self._agree(respond, np.ones_like(known) if exact else known,
-                                *self._patience(chain.moves, exact))
+                                *self._patience(chain.moves, exact),
+                                together=chain.yields[0] < np.inf)
             phase = known.copy()
             for one in found:
                 phase[one.trial.rows] = one.phase
+            agree = [one.agrees for one in found]
+            if chain.yields[0] < np.inf:
+                # What a trial leaves behind the next ones begin with.
+                agree = [all(agree)] * len(found)
+            by_row = exact and self.measurement.response == 'angle' and not all(agree)
+            arm = self._balance(chain) if by_row else None
             responses = [
-                self._row_by_row(chain, one.trial)
-                if exact and not one.agrees and self.measurement.response == 'angle'
-                else one.response for one in found]
+                one.response if arm is None or agrees else self._row_by_row(chain, one.trial, arm)
+                for one, agrees in zip(found, agree)]
         else:
             responses = respond(self.trials)
         for trial, response in zip(self.trials, responses):
@@ -249,24 +255,28 @@ class Simulator:
             return MOVING_PASSES if moves else PASSES, AGREEMENT
         return MOVING_FIT_PASSES if moves else FIT_PASSES, FIT_AGREEMENT
 
-    def _agree(self, respond: Callable, phase: np.ndarray, passes: int, agreement: float
-               ) -> list[_Agreement]:
-        """Return each trial with the phase that it has itself, begun with a phase (rows,)."""
+    def _agree(self, respond: Callable, phase: np.ndarray, passes: int, agreement: float,
+               together: bool = False) -> list[_Agreement]:
+        """
+        Return each trial with the phase that it has itself, begun with a phase (rows,).
+
+        Where trials depend on those before, they go on `together` until all agree.
+        """
         found = [_Agreement(trial, phase[trial.rows], agreement) for trial in self.trials]
         searching = found
         for _ in range(passes):
             for one, response in zip(searching, respond([one.driven() for one in searching])):
                 one.take(response, self._phase(response.output))
-            searching = [one for one in searching if one.searching]
-            if not searching:
+            still = [one for one in searching if one.searching]
+            if not still:
                 break
+            searching = searching if together else still
         return found
 
-    def _row_by_row(self, chain: Chain, trial: Trial) -> Response:
+    def _row_by_row(self, chain: Chain, trial: Trial, balance: Lifting) -> Response:
         """Return the response of an arm whose phase is found in each row before the next."""
-        balance = self._balance(chain)
         arm = Stepper(self.model, chain, self.model.first_stage(chain), balance)
-        rest = arm.start()
+        rest = arm.start(float(trial.inputs.clock[0] - trial.inputs.dt[0]))
         columns = [np.broadcast_to(column, trial.drive.shape).tolist()
                    for column in (trial.drive, *trial.inputs)]
         rows = [(arm.step(drive, Inputs(*inputs)), balance.output, balance.operators[0].input)
@@ -300,13 +310,19 @@ class Simulator:
         stage = self.model.require_length_stage()
         return lambda trials: [self._length(chain, first, stage, trial) for trial in trials]
 
-    def _balance(self, chain: Chain) -> ArmBalance:
-        """Return the balance of an arm; most sets of effects differ in what it does not see."""
-        key = tuple((effect.id, *effect.values.values())
-                    for effect in (*chain.material, *chain.mechanism))
+    def _balance(self, chain: Chain) -> Lifting:
+        """Return the balance of an arm, with what happens to its muscles meanwhile."""
+        return self.model.lifting(chain, lambda muscles: self._balance_with(chain, muscles))
+
+    def _balance_with(self, chain: Chain, muscles: int | None) -> ArmBalance:
+        """Return the balance of some muscles; most sets of effects differ in what it knows not."""
+        # What happens meanwhile none of them knows.
+        key = (muscles, *((effect.id, *effect.values.values())
+                          for effect in (*chain.material, *chain.mechanism)
+                          if effect not in chain.meanwhile))
         made = self._balances.get(key)
         if made is None:
-            made = self.model.balance(chain, self._statics)
+            made = self.model.balance(chain, self._statics, muscles)
             if len(self._balances) >= MOST_BALANCES:
                 self._balances.clear()
             self._balances[key] = made
@@ -346,7 +362,7 @@ class Simulator:
         return Response(base + chain.scale(trial.load) * factor * (output - base)
                         + chain.stretch(trial.load) + offset, output)
 
-    def _angles(self, chain: Chain, first: FirstStage, balance: ArmBalance,
+    def _angles(self, chain: Chain, first: FirstStage, balance: Lifting,
                 asked: np.ndarray | None, trials: Sequence[Trial]) -> list[Response]:
         """Return what the arm does; the trials run in one call of the kernel."""
         # The phase is looked at in all rows.
@@ -355,23 +371,34 @@ class Simulator:
         for trial in trials:
             cold, x, drive_squared = self._first(chain, first, trial)
             columns.append(np.array([
-                x, *chain.drift(trial.drive, drive_squared, trial.inputs), trial.inputs.dt]))
+                x, *chain.drift(trial.drive, drive_squared, trial.inputs), trial.inputs.dt,
+                trial.inputs.clock]))
             if asked is not None:
-                rows.append(balanced_rows(
-                    columns[-1][:3], chain.rows_read(asked[trial.rows], trial.inputs), spacing))
+                read = chain.rows_read(asked[trial.rows], trial.inputs)
+                if chain.break_time < np.inf:
+                    read = read | _beside(trial.inputs.clock, chain.break_time)
+                rows.append(balanced_rows(columns[-1][:3], read, spacing))
         kept = [own[:, one] for own, one in zip(columns, rows)] if rows else columns
         ends = np.cumsum([own.shape[1] for own in kept])
-        x, offset, factor, dt = np.concatenate(kept, axis=1)
-        rest, *found = balance.run(cold, ends, x, dt, offset, factor)
+        x, offset, factor, dt, clock = np.concatenate(kept, axis=1)
+        rest, *found = balance.run(cold, ends, x, dt, offset, factor, clock)
         responses = []
-        for place, end in enumerate(ends):
+        for place, (end, angle) in enumerate(zip(ends, np.broadcast_to(rest, len(ends)).tolist())):
             angles, outputs, inputs = (
                 column[end - kept[place].shape[1]:end] for column in found)
             if rows:
                 angles, outputs, inputs = (between(rows[place], columns[place][0], column)
                                            for column in (angles, outputs, inputs))
-            responses.append(Response(angles, outputs, inputs, rest))
+            responses.append(Response(angles, outputs, inputs, angle))
         return responses
+
+
+def _beside(clock: np.ndarray, time: float) -> np.ndarray:
+    """Return whether each row of a trial (rows,) is the last before a time or the first after."""
+    found = np.zeros(len(clock), dtype=bool)
+    after = int(np.searchsorted(clock, time, 'right'))
+    found[max(after - 1, 0):after + 1] = True
+    return found
 
 
 class _Agreement:
@@ -398,6 +425,7 @@ class _Agreement:
     def take(self, response: Response, caused: np.ndarray) -> None:
         """Take the response to the phase, and the phase (rows,) that it has."""
         self.response, residual = response, caused - self.phase
+        self.searching, self.agrees = True, False
         if self._phases and np.sqrt(np.mean(residual ** 2)) < self._agreement:
             self.searching, self.agrees = False, True
         elif not np.all(np.isfinite(residual)):

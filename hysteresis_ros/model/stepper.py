@@ -5,16 +5,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
-from hysteresis_ros.bicep.balance import ArmBalance
 from hysteresis_ros.effects import Inputs
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.phase import agree
 
 if TYPE_CHECKING:
-    from hysteresis_ros.model.muscle import MuscleModel
+    from hysteresis_ros.model.muscle import Lifting, MuscleModel
 
 
 class Stepper:
@@ -32,22 +31,22 @@ class Stepper:
         Its effects.
     first : FirstStage
         Its first stage.
-    balance : ArmBalance
+    balance : ArmBalance, BreakingBalance or YieldingBalance
         The arm.
     """
 
-    def __init__(self, model: MuscleModel, chain: Chain, first: FirstStage, balance: ArmBalance
-                 ) -> None:
+    def __init__(self, model: MuscleModel, chain: Chain, first: FirstStage,
+                 balance: Lifting) -> None:
         self._model = model
         self._chain, self._first, self._balance = chain, first, balance
 
-    def start(self) -> float:
-        """Wipe the memory: full heat and cool cycle; return the angle at rest [rad]."""
+    def start(self, clock: float = 0.0) -> float:
+        """Wipe the memory: full heat and cool cycle, at `clock` [s]; return the angle at rest."""
         self._chain.start()
         self._first.reset()
         self._phase = 1.0
         cold = float(self._chain.to_drive_squared(self._model.cold_drive))
-        return self._balance.settle(self._first.step(cold))
+        return self._balance.settle(self._first.step(cold), clock)
 
     def step(self, drive: float, inputs: Inputs) -> float:
         """Advance to the next sample and return the angle [rad]; `inputs.phase` does not count."""
@@ -63,11 +62,12 @@ class Stepper:
         drive_squared = self._chain.step(drive, inputs)
         offset, factor = self._chain.advance(drive, drive_squared, inputs)
         x = self._first.peek(drive_squared)
-        return self._balance.step(x, inputs.dt, offset, factor), drive_squared
+        return self._balance.step(x, inputs.dt, offset, factor, inputs.clock), drive_squared
 
     def _agree(self, drive: float, inputs: Inputs) -> tuple[float, float]:
         """Do the same with the phase that it leads to."""
-        chain, balance = self._chain.save(), self._balance.snapshot()
+        chain = self._chain.save()
+        balance: Any = self._balance.snapshot()
         found = math.nan, math.nan
 
         def caused(phase: float) -> float:

@@ -1,0 +1,126 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""An arm whose muscles keep a residual strain from the largest load that they have borne."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import copy
+import math
+from typing import Any
+
+import numpy as np
+
+from hysteresis_ros.bicep.balance import ArmBalance
+from hysteresis_ros.bicep.breaking import BreakingBalance
+from hysteresis_ros.operators import HysteresisOperator
+
+# A residual elongation is found to this [m], in so many trials at most.
+TOLERANCE, MOST_TRIALS = 1e-9, 60
+
+
+class YieldingBalance:
+    """
+    An arm and its muscles that yield; used as an `ArmBalance` is.
+
+    The residual elongation is the largest ``(F - Fy) / K`` so far. Where a sample would make it
+    larger, the arm sinks by it, so that the sample is balanced again until both agree. Heating and
+    cooling do not undo it; it lasts as long as this object.
+
+    Parameters
+    ----------
+    arm : ArmBalance or BreakingBalance
+        The arm without residual strain.
+    load : float
+        Load Fy of each muscle from which it yields [N].
+    compliance : float
+        Residual elongation per load beyond, 1 / K [m/N].
+    """
+
+    def __init__(self, arm: ArmBalance | BreakingBalance, load: float, compliance: float) -> None:
+        self._arm: Any = arm
+        self._load, self._compliance = load, compliance
+        self.span = arm.span
+        self._residual = 0.0
+
+    def copy(self) -> YieldingBalance:
+        """Return the same arm with a state of its own."""
+        other = copy.copy(self)
+        other._arm = self._arm.copy()
+        return other
+
+    def snapshot(self) -> tuple[float, Any]:
+        """Return the state for `rewind`."""
+        return self._residual, self._arm.snapshot()
+
+    def rewind(self, snapshot: tuple[float, Any]) -> None:
+        """Go back to a state that `snapshot` returned."""
+        self._residual, state = snapshot
+        self._arm.rewind(state)
+
+    @property
+    def residual(self) -> float:
+        """Residual elongation of each muscle so far [m]."""
+        return self._residual
+
+    @property
+    def output(self) -> float:
+        """Output of H2 [m]; see `ArmBalance`."""
+        return self._arm.output
+
+    @property
+    def operators(self) -> list[HysteresisOperator]:
+        """H2 of each muscle that is told from the others."""
+        return self._arm.operators
+
+    def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
+        """Wipe the memory, take up the state of rest under `x` at `clock` [s]; see `ArmBalance`."""
+        return self._yield(lambda more: self._arm.settle(x, clock, offset + more))
+
+    def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
+             clock: float = 0.0) -> float:
+        """Advance to the next sample, at `clock` [s]; see `ArmBalance`."""
+        return self._yield(lambda more: self._arm.step(x, dt, offset + more, factor, clock))
+
+    def _yield(self, advance: Callable[[float], float]) -> float:
+        """Return the angle of `advance(residual)`, with the residual that its load leaves."""
+        state = self._arm.snapshot()
+        angle = advance(self._residual)
+        low, above = self._residual, self._left_by(angle) - self._residual
+        high, below = math.inf, 0.0
+        # The longer the muscles, the less they yield.
+        for trial in range(MOST_TRIALS if above > TOLERANCE else 0):
+            if high == math.inf:
+                self._residual = low + above
+            elif trial % 2:
+                self._residual = low + (high - low) * above / (above - below)
+            else:
+                self._residual = 0.5 * (low + high)
+            self._arm.rewind(state)
+            angle = advance(self._residual)
+            error = self._left_by(angle) - self._residual
+            if abs(error) <= TOLERANCE:
+                break
+            if error > 0.0:
+                low, above = self._residual, error
+            else:
+                high, below = self._residual, error
+        return angle
+
+    def _left_by(self, angle: float) -> float:
+        """Return the residual elongation [m] that the load at an angle [rad] leaves."""
+        return self._compliance * max(self._arm.load(angle) - self._load, 0.0)
+
+    def run(self, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
+            factor: np.ndarray, clock: np.ndarray
+            ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Run all trials of a recording, each from the cold state; see `BreakingBalance`."""
+        self._residual = 0.0
+        rests, found, begin = [], np.empty((3, len(x))), 0
+        columns = np.array([x, dt, offset, factor, clock])
+        for end in np.asarray(ends).tolist():
+            rests.append(self.settle(cold, float(clock[begin] - dt[begin])))
+            for row, values in enumerate(columns[:, begin:end].T.tolist(), begin):
+                found[:, row] = self.step(*values), self.output, self.operators[0].input
+            begin = end
+        return np.array(rests), *found

@@ -1,0 +1,68 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What warmer or colder air adds to the drive squared that the muscle feels (Eq. 2)."""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.thermal import ThermalEffect
+
+
+class AmbientTemperature(ThermalEffect):
+    """The recorded ambient temperature shifts the wire's own."""
+
+    id = 'ambient_temperature'
+    sentence = 'Warm air heats the wire as the drive does: the recorded ambient temperature counts.'
+    equation = 'Vs^2 = V^2 + (d1/d2) (Ta - T0)'
+    source = 'Eq. 2 of the paper with a variable T0'
+    shows_in = 'the recorded ambient temperature'
+    experiment = 'log the ambient temperature on a cold and on a warm day'
+    confused_with = ('ambient_drift',)
+    needs_column = 'ambient_temperature'
+    smallest_change = 0.5
+    parameters = (
+        Parameter('gain', 'V^2/K', 'd1/d2: drive squared that one kelvin stands for', 0.02, 2.0,
+                  0.0, (0.2, 0.6), log=True),
+        Parameter('reference', 'degC', 'ambient temperature T0 of the bench', 5.0, 40.0, 25.0,
+                  (23.0,)),)
+
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
+        """Add what warmer or colder air stands for; nothing where it was not recorded."""
+        warmer = np.where(np.isfinite(inputs.ambient), inputs.ambient - self.reference, 0.0)
+        return signal + self.gain * warmer
+
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
+        """Drive less in warm air."""
+        if not math.isfinite(inputs.ambient):
+            return signal
+        return signal - self.gain * (inputs.ambient - self.reference)
+
+
+class AmbientDrift(ThermalEffect):
+    """The ambient temperature changes slowly and nobody recorded it."""
+
+    id = 'ambient_drift'
+    sentence = 'The room slowly gets warmer or colder during the recording.'
+    equation = 'Vs^2 = V^2 + a + b (t/t1) + c (t/t1)^2, t the time of day, t1 = 10 min'
+    source = 'Eq. 2 of the paper with T0 a slow function of time'
+    shows_in = 'time of day'
+    experiment = 'repeat the same loop every few minutes, or log the ambient temperature'
+    confused_with = ('fatigue', 'creep')
+    invertible = False
+    parameters = (
+        # A room differs by up to 20 K, of about 0.4 V^2 each, and settles within minutes.
+        Parameter('offset', 'V^2', 'what the air at the start adds against the bench', 0.0, 8.0,
+                  0.0, (0.0,), both_signs=True),
+        Parameter('rate', 'V^2/10 min', 'change of that', 0.05, 12.0, 0.0, (-1.0, 1.0),
+                  both_signs=True),
+        Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.0, 8.0, 0.0, (0.0,),
+                  both_signs=True),)
+
+    CLOCK_UNIT = 600.0
+
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
+        """Add a slow function of the time since the recording began."""
+        t = inputs.clock / self.CLOCK_UNIT
+        return signal + self.offset + self.rate * t + self.curvature * t * t

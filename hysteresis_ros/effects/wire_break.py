@@ -1,0 +1,66 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""An event: one of the parallel muscles breaks, and the others carry its load from then on."""
+
+import math
+
+import numpy as np
+
+from hysteresis_ros.effects.base import Parameter, Surroundings
+from hysteresis_ros.effects.stages import MechanismEffect
+
+# On each side of the event at least so many rows, and this share of all, are needed.
+LEAST_ROWS, MARGIN = 3, 0.04
+# How far before the first row after the event, as a share of its time, a fit starts.
+BEFORE = 0.01
+
+
+class WireBreak(MechanismEffect):
+    """
+    One of n parallel muscles breaks at a moment of the recording, and n - 1 bear the load.
+
+    Until the muscle is replaced it is broken in all that follows, also after heating and cooling. A
+    time counts in each recording from its own start. No controller undoes it: the others have to
+    bear n / (n - 1) times the load that the bench was chosen for.
+    """
+
+    id = 'wire_break'
+    sentence = 'One of the parallel muscles broke: from then on the others carry its load, too.'
+    equation = 'F = tau / (n r) before t, tau / ((n - 1) r) from t on, r the moment arm'
+    source = 'balance of moments, Eq. 16 of the paper, with n - 1 muscles'
+    shows_in = 'everything from one moment on, in proportion to the load'
+    experiment = 'look at the muscles, and measure the tension or the current of each'
+    confused_with = ('fatigue', 'payload_error', 'slack')
+    invertible = False
+    parameters = (
+        # From the first seconds of a recording to a whole day.
+        Parameter('time', 's', 'when it broke, since the recording began', 1.0, 1e5, 0.0, (1000.0,),
+                  log=True),)
+
+    @classmethod
+    def available(cls, surroundings: Surroundings) -> bool:
+        """Whether there is another muscle to carry the load."""
+        return surroundings.muscles > 1
+
+    @property
+    def break_time(self) -> float:  # type: ignore[override]
+        """Return when a muscle breaks [s]; infinite if none does."""
+        return self.time if self.time > 0.0 else math.inf
+
+    def moments(self, residual: np.ndarray, clock: np.ndarray) -> list[dict[str, float]]:
+        """Return the moment at which the residual changes most, in its mean and size."""
+        count = len(residual)
+        margin = max(LEAST_ROWS, int(MARGIN * count))
+        if count < 2 * margin + 1:
+            return []
+        before = np.arange(margin, count - margin + 1)
+        logs = np.zeros(len(before))
+        # Gaussian noise of another mean and size on each side (a change point's likelihood).
+        for values, rows in ((residual, before), (residual[::-1], count - before)):
+            sums, squares = np.cumsum(values), np.cumsum(values ** 2)
+            variance = squares[rows - 1] / rows - (sums[rows - 1] / rows) ** 2
+            logs += rows * np.log(np.maximum(variance, 1e-12 * squares[-1] + 1e-300))
+        row = int(before[np.argmin(logs)])
+        last, first = float(clock[row - 1]), float(clock[row])
+        time = (1.0 - BEFORE) * first
+        return [{'time': time if time > last else 0.5 * (last + first)}]

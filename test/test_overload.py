@@ -1,0 +1,173 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A muscle that yields under its largest load: on the model's arm, its memory, the laboratory's."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hidden_cases import found_in
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.laboratory.arm import Arm
+from hysteresis_ros.laboratory.conditions import Air, Conditions
+from hysteresis_ros.laboratory.linkage import Linkage
+from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.model import simulation, Simulator
+from model_support import arm_run, bicep_model, effect_of, GEOMETRY, runs, wandering_voltage
+
+MODEL = bicep_model()
+# Load from which it yields [N]: the arm has it at about 100 deg; the larger, the higher it is.
+FROM = 6.4
+COMPLIANCE = 3e-3
+
+
+def yielding(*names, load=FROM):
+    """Return the model whose muscles yield, with other effects."""
+    overload = effect_of(MODEL, 'overload', Fy=load / MODEL.surroundings.load,
+                         compliance=1e3 * COMPLIANCE)
+    return MODEL.with_effects([overload, *(effect_of(MODEL, name) for name in names)])
+
+
+def slack(length):
+    """Return the model whose muscles are longer [m]."""
+    return MODEL.with_effects([effect_of(MODEL, 'slack', Ls=1e3 * length)])
+
+
+def angles(model, run, **options):
+    """Return the simulated angles [rad] of a run."""
+    return Simulator(model, run).run(model.effects, **options)
+
+
+def test_the_residual_is_that_of_the_largest_load_so_far():
+    model = yielding()
+    arm, stage = model.lifting(model.chain()), MODEL.first_stage(MODEL.chain())
+    arm.settle(stage.step(0.0))
+    largest = 0.0
+    for volts in (3.6, 4.4, 3.9, 5.2, 6.0, 3.0, 5.8):
+        angle = arm.step(stage.step(volts ** 2), 30.0)
+        largest = max(largest, float(GEOMETRY.force(angle)))
+        assert arm.residual == pytest.approx(COMPLIANCE * max(largest - FROM, 0.0), abs=2e-8)
+    assert arm.residual > 5e-4
+
+
+def test_it_yields_once_and_is_longer_from_then_on():
+    voltage = np.array([3.0, 3.6, 6.0, 3.0, 6.0, 3.0, 6.0])
+    run = arm_run(voltage, 30.0)
+    found, plain = angles(yielding(), run), angles(MODEL, run)
+    np.testing.assert_allclose(found[:2], plain[:2], atol=1e-9)
+    residual = COMPLIANCE * (float(GEOMETRY.force(found[2])) - FROM)
+    assert residual > 5e-4
+    # Settled again at the same drive it is as an arm whose muscles always were longer.
+    np.testing.assert_allclose(found[3:], angles(slack(residual), run)[3:], atol=math.radians(0.05))
+    np.testing.assert_allclose(found[[4, 6]], found[2], atol=math.radians(0.05))
+
+
+def test_later_trials_begin_with_what_earlier_ones_left():
+    run = runs(MODEL, trials=2, rows=40)
+    found, again = (angles(yielding(), run) for _ in range(2))
+    alone = angles(yielding(), run.select([1]))
+    np.testing.assert_array_equal(found, again)
+    assert found[40] > alone[0] + 0.005
+    # It is the largest load that counts, not how often it came.
+    assert found[-1] == pytest.approx(alone[-1], abs=0.02)
+
+
+@pytest.mark.parametrize('dt', [0.1, 30.0])
+@pytest.mark.parametrize('names', [(), ('latent_heat', 'backlash'), ('inertia',), ('wire_break',),
+                                   ('unequal_muscles', 'coulomb_friction')])
+def test_observer_and_simulation_agree(names, dt):
+    model = yielding(*names)
+    run = arm_run(wandering_voltage(80, 5), dt, first=dt)
+    observer = model.observer()
+    observer.reset(0.0)
+    stepped = [observer.step(t, v) for t, v in zip(run.time, run.columns['voltage'])]
+    np.testing.assert_allclose(stepped, model.predict(run), atol=math.radians(0.01))
+
+
+@pytest.mark.parametrize('names', [(), ('latent_heat',), ('creep', 'wire_break')])
+def test_what_is_judged_does_not_depend_on_what_is_interpolated(names):
+    model, run = yielding(*names), runs(MODEL, trials=2, rows=60)
+    judged = np.arange(0, run.rows, 5)
+    np.testing.assert_allclose(Simulator(model, run, judged).run(model.effects)[judged],
+                               angles(model, run)[judged], atol=math.radians(0.01))
+
+
+@pytest.mark.parametrize('passes', [7, 8, 9, 16])
+def test_phases_come_into_agreement_with_what_earlier_trials_left(passes, monkeypatch):
+    """Whether all trials agree in so many passes, some, or none, which are followed by rows."""
+    volts = [np.linspace(0.0, 6.0, 8), 0.8 * wandering_voltage(90)]
+    time, trial, voltage = (np.concatenate(parts) for parts in (
+        [1.0 + np.arange(len(one)) for one in volts],
+        [np.full(len(one), float(number)) for number, one in enumerate(volts)], volts))
+    run = Measurement.from_columns({'time': time, 'trial': trial, 'voltage': voltage,
+                                    'angle': np.ones(len(time))})
+    # The first trial agrees in eight passes, the second in eleven.
+    model = yielding()
+    model = model.with_effects([*model.effects, effect_of(
+        MODEL, 'latent_heat', time_constant=3.0, latent=0.8)])
+    first, second = (model.lifting(model.chain()) for _ in range(2))
+    by_row = np.concatenate([Simulator(model, run)._row_by_row(model.chain(), one, first).values
+                             for one in Simulator(model, run).trials])
+    alone = Simulator(model, run)._row_by_row(
+        model.chain(), Simulator(model, run).trials[1], second).values
+    monkeypatch.setattr(simulation, 'PASSES', passes)
+    found = angles(model, run, exact=True)
+    np.testing.assert_allclose(found, by_row, atol=math.radians(0.05))
+    # Ten times that is what the second would lack if it began anew.
+    assert np.max(np.abs(found[8:] - alone)) > math.radians(0.5)
+
+
+def test_heating_and_cooling_does_not_undo_it():
+    arm, fresh = (yielding().lifting(yielding().chain()) for _ in range(2))
+    arm.settle(0.5)
+    arm.step(13.0, 30.0)
+    assert arm.settle(0.5) > fresh.settle(0.5) + 0.01
+    observer = yielding().observer()
+    before = observer.step(30.0, 3.0)
+    observer.step(60.0, 6.0)
+    observer.reset()
+    assert observer.step(90.0, 3.0) > before + 0.02
+
+
+def test_a_load_that_is_never_reached_changes_nothing():
+    run = arm_run(wandering_voltage(40), 30.0)
+    np.testing.assert_allclose(angles(yielding(load=14.0), run), angles(MODEL, run), atol=1e-9)
+
+
+def test_it_is_named_among_what_lengthens_a_muscle_too():
+    tried = ['overload', 'slack', 'series_compliance', 'fatigue', 'payload_error']
+    found = diagnose(MODEL, [runs(yielding(), trials=3, rows=40)], tried)
+    assert found.missing == ['overload']
+    assert found.effects[0].Fy * MODEL.surroundings.load == pytest.approx(FROM, abs=0.2)
+    assert found.effects[0].compliance == pytest.approx(1e3 * COMPLIANCE, rel=0.3)
+    assert diagnose(MODEL, [runs(slack(2e-3), trials=3, rows=40)], tried).missing == ['slack']
+
+
+def test_the_laboratorys_wires_stay_longer_after_the_largest_load():
+    linkage = Linkage()
+    plain, arm = (Arm(Conditions(air=Air(turbulence=0.0), yield_tension=tension,
+                                 yield_compliance=0.004)) for tension in (math.inf, 5.8))
+    shifts = []
+    for voltage in (3.0, 6.0, 3.0, 6.0, 3.0):
+        for one in (plain, arm):
+            one.settle(30.0, voltage)
+        shifts.append(linkage.elongation(arm.angle) - linkage.elongation(plain.angle))
+    largest = linkage.moment(arm.angle) / (3.0 * linkage.moment_arm(arm.angle))
+    assert shifts[0] == pytest.approx(0.0, abs=1e-5) and largest < 5.8
+    assert 5e-4 < shifts[1] < 0.004 * (6.8 - 5.8)
+    # The same load once more changes nothing, and less of it does not take it back.
+    np.testing.assert_allclose(shifts[3:], shifts[1:3], rtol=1e-3)
+    assert shifts[2] > 0.5 * shifts[1]
+    for one in (plain, arm):
+        one.heat_and_cool()
+        one.settle(30.0, 3.0)
+    assert linkage.elongation(arm.angle) - linkage.elongation(plain.angle) > 0.5 * shifts[1]
+
+
+@pytest.mark.slow
+def test_it_is_found_on_an_arm_of_the_laboratory():
+    tried = ['overload', 'slack', 'series_compliance', 'fatigue', 'payload_error', 'geometry_error']
+    found = found_in({'overload': 1.0}, 4, tried, 'arm-steps')
+    assert found.missing == ['overload'], found.sets[:4]
+    assert found.effects[0].implausible() == []
