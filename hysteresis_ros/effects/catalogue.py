@@ -7,8 +7,8 @@ import inspect
 from importlib import metadata
 
 from hysteresis_ros.effects import (
-    cable_friction, electrical, encoder_eccentricity, material, measured_supply, mechanism, sensor,
-    thermal, transformation_slopes, valve_lag, viscoelastic_creep)
+    cable_friction, electrical, encoder_eccentricity, formation_memory, material, measured_supply,
+    mechanism, sensor, thermal, transformation_slopes, valve_lag, viscoelastic_creep)
 from hysteresis_ros.effects.base import Effect, STAGES
 from hysteresis_ros.effects.stages import (
     DriveEffect, MaterialEffect, MechanismEffect, SensorEffect)
@@ -25,7 +25,8 @@ DESCRIPTION = ('id', 'stage', 'sentence', 'equation', 'source', 'shows_in', 'exp
 def _own() -> list[type[Effect]]:
     found = []
     for module in (electrical, measured_supply, thermal, valve_lag, material, viscoelastic_creep,
-                   transformation_slopes, mechanism, cable_friction, sensor, encoder_eccentricity):
+                   transformation_slopes, formation_memory, mechanism, cable_friction, sensor,
+                   encoder_eccentricity):
         found += [member for member in vars(module).values()
                   if inspect.isclass(member) and issubclass(member, Effect)
                   and member.__module__ == module.__name__ and 'id' in vars(member)]
