@@ -136,6 +136,11 @@ def _r_phase(conditions: Conditions, size: float, specimen: np.random.Generator,
     conditions.material = conditions.material.with_early_phase(0.0085 * size)
 
 
+def _formation_memory(conditions: Conditions, size: float, specimen: np.random.Generator,
+                      recording: np.random.Generator) -> None:
+    conditions.material = conditions.material.with_kept_strain(min(0.85 * size, 1.0))
+
+
 def _creep(conditions: Conditions, size: float, specimen: np.random.Generator,
            recording: np.random.Generator) -> None:
     conditions.creep = 0.004 * size
@@ -299,6 +304,8 @@ LATER = {
                                    _encoder_eccentricity),
     'measured_supply': Effect('The battery runs down and dips; the board counts on its nominal '
                               'voltage, and a meter records it.', _measured_supply),
+    'formation_memory': Effect('Martensite keeps the strain of the load under which it formed.',
+                               _formation_memory, bench=True),
 }
 
 EFFECTS = {**LISTED, **{name: Effect(kind.__doc__ or '', _disturb(kind), listed=False)
