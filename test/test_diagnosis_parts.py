@@ -155,6 +155,21 @@ def test_what_martensite_may_keep_of_its_load_is_part_of_the_discrepancy():
     assert found == pytest.approx((0.0004 * gain) ** 2 + history.path ** 2 + kept)
 
 
+@pytest.mark.parametrize('fitted', [True, False])
+def test_what_may_be_kept_is_no_discrepancy_where_it_is_an_effect(fitted):
+    """In a set, or tried beside it, its own parameter says how much is kept."""
+    model = bicep_model()
+    effects = [effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)]
+    if fitted:
+        effects.append(effect_of(model, 'formation_memory', kept=0.4))
+    problem = problem_for(model.with_effects(effects), [runs(model)])
+    gain, history = discrepancy.sensitivity(problem, effects), load_history(problem, effects)
+    found = discrepancy.discrepancy_along(
+        problem, effects, problem.simulate(effects), Settings(),
+        () if fitted else ('slack', 'formation_memory'))
+    assert np.diag(found.matrix()) == pytest.approx((0.0004 * gain) ** 2 + history.path ** 2)
+
+
 def test_errors_of_rows_that_are_near_in_drive_and_response_are_alike(problem):
     """More so on the same way of the drive than on the way back."""
     predicted, settings = problem.simulate([]), Settings()

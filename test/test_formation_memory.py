@@ -1,14 +1,24 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Martensite that keeps its strain: on the model's arm, in its inverse, and on the bench."""
+"""Martensite that keeps its strain: on the arm, in the inverse, on the bench, and found."""
 
 import numpy as np
 import pytest
 from scipy import optimize
 
+from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.kernels.formation import elongations, FORMED, OUTPUT, SCALE
+from hysteresis_ros.laboratory.bench import Bench
+from hysteresis_ros.laboratory.conditions import Air, Conditions
+from hysteresis_ros.laboratory.experiments import experiment_tables
+from hysteresis_ros.laboratory.grain_wire import GrainMaterial
+from hysteresis_ros.laboratory.linkage import GEOMETRY as LINKAGE
+from hysteresis_ros.laboratory.plant import Plant
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import Simulator
 from model_support import (
@@ -265,6 +275,77 @@ def test_under_a_weight_that_hangs_still_the_bench_shows_nothing():
     # H2 moves with the load, but what is there keeps its strain.
     assert abs(lengths(full, changed)[3] - lengths(full, changed)[2]) < 0.5 * abs(
         followed[3] - followed[2])
+
+
+def cold_then_hot(wire):
+    """Cool a wire under a growing tension, change it half way back, and return the elongations."""
+    rows = [(22.0, 2.0), (110.0, 2.0)]
+    rows += list(zip(np.linspace(110.0, 22.0, 60), np.linspace(2.0, 8.0, 60)))
+    rows += [(22.0, 3.0), (40.0, 3.0), (44.0, 3.0), (44.0, 8.0), (140.0, 8.0)]
+    found = []
+    for temperature, tension in rows:
+        peeked = wire.elongation(temperature, tension)
+        found.append((temperature, tension, wire.commit(temperature, tension), wire.martensite))
+        assert found[-1][2] == pytest.approx(peeked, abs=1e-15)
+    return np.array(found)
+
+
+def test_grains_of_the_laboratory_keep_what_they_formed_with():
+    """Half of the strain is each grain's own; without load changes none of it shows."""
+    plain, half, whole = (GrainMaterial(kept_strain=share) for share in (0.0, 0.5, 1.0))
+    ways = [cold_then_hot(one.wire()) for one in (plain, half, whole)]
+    np.testing.assert_allclose(ways[1], 0.5 * (ways[0] + ways[2]), rtol=0.0, atol=1e-12)
+    formed = (ways[2][:, 2] - ways[0][:, 2]) / plain.resting_length
+    present = np.array([plain.transformation_strain(t / plain.section) for t in ways[0][:, 1]])
+    shares = ways[0][:, 3]
+    # On the way down: the sum over what each step has added, against all under the present load.
+    added = np.diff(shares[1:62], prepend=0.0) * present[1:62]
+    np.testing.assert_allclose(formed[1:62], np.cumsum(added) - present[1:62] * shares[1:62],
+                               rtol=0.0, atol=1e-9)
+    assert formed[61] < -2e-3
+    # Unloaded it stays as long as it was, but for the elastic part; hot again all is forgotten.
+    assert formed[62] == pytest.approx(
+        formed[61] + (present[61] - present[62]) * shares[61], abs=1e-5)
+    assert abs(formed[-1]) < 1e-6
+
+
+def test_a_wire_under_a_constant_load_keeps_nothing_that_shows():
+    """So that a bench cannot tell."""
+    drive = np.array([0.0, 6.0, 3.0, 4.5, 2.0, 5.0, 0.0])
+    plain, kept = (Bench(Conditions(air=Air(turbulence=0.0), material=GrainMaterial(
+        kept_strain=share)), seed=1).length_trial(drive, 5.0) for share in (0.0, 1.0))
+    np.testing.assert_allclose(kept, plain, rtol=0.0, atol=2e-7)
+
+
+def test_other_muscles_of_the_laboratory_do_not_have_it():
+    with pytest.raises(ParameterError, match='cannot have formation_memory'):
+        Plant(1, {'formation_memory': 1.0}, muscle='brinson')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('muscle, seed, effects', [
+    ('grains', 2, {'formation_memory': 1.0}), ('lagoudas', 1, {}), ('grains', 2, {})])
+def test_kept_strain_of_the_laboratory_is_named_and_none_where_there_is_none(
+        muscle, seed, effects):
+    """Wires after Lagoudas keep it by themselves; grains where it is hidden in them."""
+    tables = experiment_tables('bench', {}, seed, muscle)
+    force, length = (Measurement.from_columns(tables[name])
+                     for name in ('force.csv', 'length.csv'))
+    trials = {'length_trials': range(4), 'force_trials': [0]}
+    model, _ = add_effects(
+        identify(length, force, geometry=BicepGeometry.from_mapping(LINKAGE), **trials).model,
+        length, force, **trials)
+    arm = Measurement.from_columns(
+        experiment_tables('arm-steps', effects, seed, muscle)['train.csv'])
+    found = diagnose(model, [arm], seed=seed)
+    if muscle == 'grains' and not effects:
+        assert (found.verdict, found.missing) == ('adequate', [])
+        return
+    assert (found.verdict, found.missing) == ('missing', ['formation_memory'])
+    # What the moduli of both phases differ by is not kept, and takes up to a third.
+    low, high = found.effects[0].intervals['kept']
+    assert low > 0.2 and high > 0.65
+    assert found.rmse_after < 0.7 * found.rmse_before
 
 
 def test_it_makes_no_sense_without_a_load():
