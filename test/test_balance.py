@@ -13,6 +13,7 @@ from hysteresis_ros.bicep.balance import ArmBalance
 from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.bicep.wires import COMPLIANCE
 from hysteresis_ros.effects import MaterialEffect
+from hysteresis_ros.kernels.formation import LOAD
 from hysteresis_ros.operators import Linear
 from model_support import bicep_model, effect_of, GEOMETRY
 
@@ -409,9 +410,9 @@ def test_drive_of_a_bundle_undoes_its_share(offsets, load, share):
     low, high = stage.output_range
     output = low + share * (high - low)
     x = bundle.drive(output, load)
-    found, inputs = bundle.respond(x, load, low - 0.1, high + 0.1, low)
+    found, following = bundle.respond(x, load, low - 0.1, high + 0.1, low)
     assert found == pytest.approx(output, abs=1e-9)
-    assert np.mean(np.maximum(np.array(inputs) + x, 0.0)) == pytest.approx(load, rel=1e-6)
+    assert np.mean(np.maximum(following[:, LOAD] + x, 0.0)) == pytest.approx(load, rel=1e-6)
 
 
 def test_bundle_stays_within_the_limits_of_its_search():

@@ -138,6 +138,7 @@ def run(case: Case, model, settings=None) -> Row:
     from hysteresis_ros.diagnosis.diagnose import diagnose
     from hysteresis_ros.diagnosis.extend import extend, rmse
     from hysteresis_ros.diagnosis.settings import Settings
+    from hysteresis_ros.effects import catalogue
     from hysteresis_ros.laboratory.experiments import experiment_tables
     from hysteresis_ros.measurements.table import Measurement
 
@@ -145,7 +146,11 @@ def run(case: Case, model, settings=None) -> Row:
     started = time.perf_counter()
     tables = experiment_tables(protocol, effects, seed, muscle)
     train, test = (Measurement.from_columns(tables[name]) for name in ('train.csv', 'test.csv'))
-    found = diagnose(model, [train], seed=seed, settings=settings or Settings())
+    # What is tried only where it is named, its user has named.
+    named = [name for name in effects
+             if name in catalogue() and catalogue()[name].doubtful(model.surroundings)]
+    found = diagnose(model, [train], list(catalogue()) if named else None, seed=seed,
+                     settings=settings or Settings())
     reported = set(found.missing).union(*found.alternatives) if found.missing else set()
     result = {'muscle': muscle, 'group': group, 'protocol': protocol, 'truth': sorted(effects),
               'seed': seed, 'verdict': found.verdict, 'missing': found.missing,

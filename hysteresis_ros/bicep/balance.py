@@ -5,6 +5,7 @@ The balance between muscle and arm: the angle for a drive and a memory.
 
 The muscle stretches to ``L = L0 + S(F) f (H2[u] - L0) + e(F) + o`` with ``u = F - x``, where x is
 the first stage's output (H1[V] in the paper's model) and F is what the arm asks for at its angle.
+Where martensite keeps strain, `kernels.formation` says what becomes of ``S(F) (H2[u] - L0)``.
 Everything that does not change from row to row is laid out here as tables; `kernels.trial` does the
 rest.
 """
@@ -22,6 +23,7 @@ from hysteresis_ros.bicep.wires import kernels_for, wires_of, with_own_memories
 from hysteresis_ros.effects.stages import Statics
 from hysteresis_ros.kernels import trial
 from hysteresis_ros.kernels.arm import Arm, MOTION, State, X
+from hysteresis_ros.kernels.formation import LOAD, SIZE
 from hysteresis_ros.operators import HysteresisOperator
 
 if TYPE_CHECKING:
@@ -105,7 +107,7 @@ class ArmBalance:
             rigid=not several and all(np.array_equal(line[0], lines[0][0]) for line in lines),
             strained=any(np.any(line[3] != 1.0) for line in lines), dynamic=self.has_dynamics,
             swings=swings, plays=chain.plays and loaded)
-        self._state = State(memories, np.empty(MOTION), np.empty(len(self.operators)))
+        self._state = State(memories, np.empty(MOTION), np.empty((len(self.operators), SIZE)))
         self._kernels = kernels_for(operator, trial)
         self.start()
 
@@ -113,20 +115,20 @@ class ArmBalance:
         """Return the same arm with a state of its own."""
         other = copy.copy(self)
         other.operators, memories = with_own_memories(self.operators)
-        other._state = State(memories, self._state.motion.copy(), self._state.loads.copy())
+        other._state = State(memories, self._state.motion.copy(), self._state.muscles.copy())
         return other
 
     def snapshot(self) -> tuple[list[Any], np.ndarray, np.ndarray]:
         """Return the state for `rewind`."""
         return ([operator.snapshot() for operator in self.operators],
-                self._state.motion.copy(), self._state.loads.copy())
+                self._state.motion.copy(), self._state.muscles.copy())
 
     def rewind(self, snapshot: tuple[list[Any], np.ndarray, np.ndarray]) -> None:
         """Go back to a state that `snapshot` returned."""
-        memories, motion, loads = snapshot
+        memories, motion, muscles = snapshot
         for operator, memory in zip(self.operators, memories):
             operator.rewind(memory)
-        self._state.motion[:], self._state.loads[:] = motion, loads
+        self._state.motion[:], self._state.muscles[:] = motion, muscles
 
     def take_over(self, other: ArmBalance) -> None:
         """Go on from the state of another arm, whose load may have been another."""
@@ -148,10 +150,16 @@ class ArmBalance:
         theta, moment, leverage = self._held
         return float(np.interp(angle, theta, np.maximum(moment, 0.0) / leverage))
 
+    @property
+    def muscles(self) -> np.ndarray:
+        """Input of H2 and what martensite keeps of each muscle, columns of `kernels.formation`."""
+        muscles = self._state.muscles.copy()
+        muscles[:, LOAD] = [operator.input for operator in self.operators]
+        return muscles
+
     def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
         """Wipe the memory, take up the state of rest under `x`, and return its angle [rad]."""
-        self.start()
-        return self.step(x, math.inf, offset)
+        return self._kernels.cool_down(self._arm, self._state, float(x), float(offset))
 
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
              clock: float = 0.0) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from hysteresis_ros.bicep.wires import kernels_for, wires_of
 from hysteresis_ros.kernels import bundle
+from hysteresis_ros.kernels.formation import SIZE
 from hysteresis_ros.operators import HysteresisOperator
 
 if TYPE_CHECKING:
@@ -28,6 +29,11 @@ class Bundle:
         Effects of the model: excess lengths of the muscles, and how a wire strains under its load.
     loaded : bool
         Whether the load is weighed against the drive.
+
+    Attributes
+    ----------
+    muscles : ndarray, shape (muscles, 4)
+        What is remembered of each beside its operator's memory; see `kernels.formation`.
     """
 
     def __init__(self, operator: HysteresisOperator, chain: Chain, loaded: bool) -> None:
@@ -35,17 +41,17 @@ class Bundle:
         self._kernels = kernels_for(operator, bundle)
         self._search = np.zeros(bundle.SEARCH)
         self._search[bundle.GAIN] = 1.0
-        self._inputs = np.zeros(len(self.operators))
+        self.muscles, self._following = np.zeros((2, len(self.operators), SIZE))
 
     def drive(self, output: float, load: float) -> float:
         """Return the x [N] under which the muscles give `output` [m] and bear `load` [N] each."""
         return self._kernels.drive(self._wires, self._memories, self._search, float(output),
-                                   float(load), self._inputs)
+                                   float(load), self.muscles)
 
     def respond(self, x: float, load: float, low: float, high: float,
-                near: float) -> tuple[float, list[float]]:
+                near: float) -> tuple[float, np.ndarray]:
         """
-        Return what the muscles give, and their inputs; commits nothing.
+        Return what the muscles give, and `muscles` with inputs of H2 that do; commits nothing.
 
         Parameters
         ----------
@@ -58,5 +64,5 @@ class Bundle:
         """
         output = self._kernels.respond(
             self._wires, self._memories, self._search, float(x), float(load), float(low),
-            float(high), float(near), self._inputs)
-        return output, self._inputs.tolist()
+            float(high), float(near), self.muscles, self._following)
+        return output, self._following.copy()

@@ -53,8 +53,8 @@ def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
     offsets = np.array(chain.offsets, dtype=float)
     operators, memories = with_own_memories([operator] * len(offsets))
     scales, widths, lightest, spacing = np.ones(1), np.zeros(1), 0.0, 1.0
-    plays = chain.plays and loaded
-    if plays or len(offsets) > 1:
+    plays, kept = chain.plays and loaded, chain.keeps_strain
+    if plays or kept or len(offsets) > 1:
         loads = np.linspace(0.0, LARGEST * (chain.surroundings.load or 1.0), LOADS)
         inside = chain.load_inside(loads) + 0.0 * loads
         lightest, spacing = float(inside[0]), float(np.ptp(inside)) / (LOADS - 1)
@@ -64,7 +64,7 @@ def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
             widths = np.interp(even, inside, chain.loop_width(loads))
     return (Wires(table, operator.output_range[0], offsets,
                   chain.compliance() or COMPLIANCE, 1e-10 * (operator.upper - operator.lower),
-                  scales, widths, lightest, spacing), operators, memories)
+                  scales, widths, lightest, spacing, kept), operators, memories)
 
 
 def with_own_memories(operators: Sequence[HysteresisOperator]

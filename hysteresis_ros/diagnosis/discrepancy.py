@@ -7,12 +7,13 @@ It is known before the arm moves. The bench says how large the error of the leng
 loads that were held out; on the arm it shows as an error of the angle that is alike at neighbouring
 drives and responses and differs between the directions of the drive. And the bench holds the load
 still, while an arm's load moves with the wire: what a load does in the middle of a transformation
-the bench cannot tell. Models that agree on every bench table bound that (`load_history`).
+the bench cannot tell. Models that agree on every bench table bound that (`load_history`); but where
+one of them is an effect that is tried, it speaks for itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 import dataclasses
 import math
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.effects import Effect, Inputs, MaterialEffect, Parameter, Surroundings
+from hysteresis_ros.effects.formation_memory import FormationMemory
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -103,9 +105,13 @@ def sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
 
 
 def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted: np.ndarray,
-                      settings: Settings) -> Discrepancy:
+                      settings: Settings, tried: Collection[str] = ()) -> Discrepancy:
     """
     Return the base model's own error of the angle, along the way that the arm takes.
+
+    How much strain martensite keeps is not known from the bench. Where `formation_memory` is in the
+    model or tried, its parameter stands for that, and a set without it says that nothing is kept;
+    otherwise anything from none to all may be.
 
     Parameters
     ----------
@@ -116,6 +122,8 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     predicted : ndarray, shape (n,)
         Response with them.
     settings : Settings
+    tried : collection of str
+        Identifiers of all effects that may explain the recording.
 
     Returns
     -------
@@ -127,9 +135,10 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
     bench = gain * (length_error(problem.model) / math.sqrt(1.0 + DIRECTIONAL ** 2))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
+    known = FormationMemory.id in {*tried, *(effect.id for effect in effects)}
+    formation = np.zeros(len(predicted)) if known else gain * history.formation
     return Discrepancy(
-        np.column_stack([bench, DIRECTIONAL * direction * bench, history.path,
-                         gain * history.formation]),
+        np.column_stack([bench, DIRECTIONAL * direction * bench, history.path, formation]),
         np.column_stack([_unit(drive), _unit(predicted)]) / settings.correlation)
 
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.effects import Effect, Statics
-from hysteresis_ros.kernels.formation import formed
+from hysteresis_ros.kernels.formation import elongations
 from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.model.chain import Chain
 
@@ -107,7 +107,7 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
                     for load in loads])
                 path = (arm.angle(loads, still[:, 1:][:, judged])
                         - arm.angle(loads, moving[None, 1:][:, judged]))
-            yield path, (formed(moving, scale) - scale * moving)[1:][judged]
+            yield path, (elongations(1.0, moving, scale) - scale * moving)[1:][judged]
 
 
 class _Statics:

@@ -79,8 +79,9 @@ class Selection:
         self.fixed = list(problem.model.effects)
         predicted = problem.simulate(self.fixed)
         self.covariance = Covariance(
-            discrepancy_along(problem, self.fixed, predicted, settings), problem.clock,
-            problem.trial, problem.noise, problem.largest_noise, settings.scale_spread)
+            discrepancy_along(problem, self.fixed, predicted, settings, self.names),
+            problem.clock, problem.trial, problem.noise, problem.largest_noise,
+            settings.scale_spread)
         self.fitter = Fitter(problem, self.covariance, self._discrepancy)
         for drift, noise in FIRST_POINTS:
             self.covariance.add(self.covariance.start(drift, noise))
@@ -102,7 +103,8 @@ class Selection:
     def _discrepancy(self, fit: Fit) -> Discrepancy:
         """Return the discrepancy of the base model where the arm goes with a fit."""
         effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
-        return discrepancy_along(self.problem, effects, fit.predicted, self.settings)
+        return discrepancy_along(
+            self.problem, effects, fit.predicted, self.settings, self.names)
 
     def run(self) -> None:
         """Score all single effects and pairs, fit the best, and grow sets from them."""

@@ -291,5 +291,5 @@ class Effect(abc.ABC):
 
     @classmethod
     def doubtful(cls, surroundings: Surroundings) -> bool:
-        """Whether only its user knows if the muscle can have it; it is tried where it is named."""
+        """Whether it is tried only where it is named; its user knows if the muscle can have it."""
         return False

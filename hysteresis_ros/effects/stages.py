@@ -70,7 +70,8 @@ class MaterialEffect(Effect):
 
     The transformation is H2 of the drive x shifted by the load F; S scales its strain, e is what
     the load alone stretches, f and o are what time and use do. The loop may be wider by w(F) than
-    that of H2: see `kernels.load_play`. Each method has a neutral default. Loads are per muscle,
+    that of H2: see `kernels.load_play`. Martensite may keep a share of its strain, whatever the
+    load: see `kernels.formation`. Each method has a neutral default. Loads are per muscle,
     scalars or arrays.
     """
 
@@ -79,6 +80,8 @@ class MaterialEffect(Effect):
     load_per_drive_squared: float = 0.0
     # Share, 0 to 1, by which the shift by the load is in proportion to `strain_of_bench`.
     follows_strain: float = 0.0
+    # Share, 0 to 1, of its strain that martensite keeps from the load under which it formed.
+    keeps_strain: float = 0.0
     # Excess length [m] of each parallel muscle.
     offsets: tuple[float, ...] = (0.0,)
 

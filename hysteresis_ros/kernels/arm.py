@@ -75,11 +75,15 @@ class Arm(NamedTuple):
 
 
 class State(NamedTuple):
-    """What an arm remembers: memory and load beyond x of each muscle, and motion."""
+    """
+    What an arm remembers.
+
+    The memory of each muscle's H2, motion, and the columns of `formation` for each muscle.
+    """
 
     memories: np.ndarray
     motion: np.ndarray
-    loads: np.ndarray
+    muscles: np.ndarray
 
 
 @lean
@@ -109,6 +113,12 @@ def place(arm: Arm, motion: np.ndarray, line: int, demand: float, offset: float
     if demand <= below:
         return k, 0.0
     return k, 1.0 if demand >= above else (demand - below) / (above - below)
+
+
+@lean
+def factor_at(arm: Arm, line: int, k: int, share: float) -> float:
+    """Return S(F), by which the load at a place makes the strain larger."""
+    return 1.0 / grid.between(arm.grid, STRAIN + LINE * line, k, share)
 
 
 @lean

@@ -7,7 +7,9 @@ A muscle that lacks dL_i is stretched further than the mean one and bears more. 
 strains its wire further, and stretches it elastically:
 ``S(F_i) (H2[u_i] - L0) + c (F_i - F) = S(F) (H - L0) - dL_i``, with S the factor on the strain
 under a load, c the compliance, F the load of the mean muscle, and H what the transformation gives
-under that load. u_i follows ``v_i = F_i - x`` with the play that its own load says (`load_play`).
+under that load. Where martensite keeps a share of its strain, ``S(F_i) (H2[u_i] - L0)`` is what
+`formation` says instead. u_i follows ``v_i = F_i - x`` with the play that its own load says
+(`load_play`).
 """
 
 from typing import NamedTuple
@@ -15,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import root
+from .formation import keep, LOAD, parts, SIZE
 from .lean import lean
 from .load_play import held
 from .operator import last_input, last_output, peek, step
@@ -36,6 +39,7 @@ class Wires(NamedTuple):
     lengths, `compliance` [m/N] that of a wire, and `tolerance` [N] the load that may be missing.
     `scales` (m,) is the factor on the strain, and `widths` (m,) by how much the loop is wider than
     that of H2, at loads `spacing` [N] apart from `lightest` on, as the transformation feels them.
+    `kept` is the share of the strain that martensite keeps (see `formation`).
     """
 
     table: np.ndarray
@@ -47,6 +51,7 @@ class Wires(NamedTuple):
     widths: np.ndarray
     lightest: float
     spacing: float
+    kept: float
 
 
 @lean
@@ -74,23 +79,23 @@ def input_for(wires: Wires, memory: np.ndarray, v: float, x: float) -> float:
 
 @lean
 def loads_for(wires: Wires, memories: np.ndarray, output: float, load: float, x: float,
-              loads: np.ndarray) -> None:
+              muscles: np.ndarray) -> None:
     """
-    Put each muscle's ``v_i = F_i - x`` for an output under a mean load into `loads`.
+    Put each muscle's ``v_i = F_i - x`` for an output under a mean load into `muscles`.
 
-    What is there is where the search begins.
+    What is there is where the search begins; the other columns say what martensite keeps.
     """
     for i in range(len(wires.offsets)):
-        loads[i] = _load_for(wires, memories[i], wires.offsets[i], output, load, x, loads[i])
+        muscles[i, LOAD] = _load_for(wires, memories[i], muscles, i, output, load, x)
 
 
 @lean
-def _load_for(wires: Wires, memory: np.ndarray, offset: float, output: float, load: float,
-              x: float, start: float) -> float:
+def _load_for(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, output: float,
+              load: float, x: float) -> float:
     """Return v of one muscle, by stepping outward and then by false position."""
     tolerance = wires.tolerance * wires.compliance
-    near = start
-    here = _excess(wires, memory, near, offset, output, load, x)
+    near = muscles[i, LOAD]
+    here = _excess(wires, memory, muscles, i, near, output, load, x)
     if abs(here) <= tolerance:
         return near
     # The elastic part alone brings a muscle where it has to be on this way.
@@ -101,12 +106,12 @@ def _load_for(wires: Wires, memory: np.ndarray, offset: float, output: float, lo
         near, here = far, there
         far = near + stride
         far = min(far, limit) if stride > 0.0 else max(far, limit)
-        there = _excess(wires, memory, far, offset, output, load, x)
+        there = _excess(wires, memory, muscles, i, far, output, load, x)
         stride *= 2.0
         count += 1
     while abs(there) > tolerance and there != here and count < MOST_EVALUATIONS:
         point = far - there * (far - near) / (there - here)
-        value = _excess(wires, memory, point, offset, output, load, x)
+        value = _excess(wires, memory, muscles, i, point, output, load, x)
         if value * there < 0.0:
             near, here = far, there
         else:
@@ -117,21 +122,22 @@ def _load_for(wires: Wires, memory: np.ndarray, offset: float, output: float, lo
 
 
 @lean
-def _excess(wires: Wires, memory: np.ndarray, v: float, offset: float, output: float, load: float,
-            x: float) -> float:
+def _excess(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, v: float,
+            output: float, load: float, x: float) -> float:
     """Return how much longer a muscle with a load v + x is than the others let it be [m]."""
     mean, given = scale_at(wires, load), peek(wires.table, memory, input_for(wires, memory, v, x))
-    return (scale_at(wires, v + x) * (given - wires.base)
-            + wires.compliance * (v + x - load) + offset) / mean - (output - wires.base)
+    strained, held = parts(wires.kept, muscles, i, given - wires.base)
+    return (scale_at(wires, v + x) * strained + held + wires.compliance * (v + x - load)
+            + wires.offsets[i]) / mean - (output - wires.base)
 
 
 @lean
-def mean_load(loads: np.ndarray, x: float) -> float:
+def mean_load(muscles: np.ndarray, x: float) -> float:
     """Return the mean load for each muscle's v; a wire cannot push."""
     total = 0.0
-    for i in range(len(loads)):
-        total += max(loads[i] + x, 0.0)
-    return total / len(loads)
+    for i in range(len(muscles)):
+        total += max(muscles[i, LOAD] + x, 0.0)
+    return total / len(muscles)
 
 
 @lean
@@ -153,10 +159,14 @@ def mean_output(wires: Wires, memories: np.ndarray) -> float:
 
 
 @lean
-def commit(wires: Wires, memories: np.ndarray, loads: np.ndarray, x: float) -> None:
+def commit(wires: Wires, memories: np.ndarray, muscles: np.ndarray, x: float) -> None:
     """Commit each muscle's v."""
     for i in range(len(wires.offsets)):
-        step(wires.table, memories[i], input_for(wires, memories[i], loads[i], x))
+        v = muscles[i, LOAD]
+        step(wires.table, memories[i], input_for(wires, memories[i], v, x))
+        if wires.kept != 0.0:
+            keep(muscles, i, last_output(wires.table, memories[i]) - wires.base,
+                 scale_at(wires, v + x))
 
 
 @lean
@@ -167,40 +177,49 @@ def keep_gain(search: np.ndarray, at: int, moved: float, scale: float, here: flo
 
 @lean
 def drive(wires: Wires, memories: np.ndarray, search: np.ndarray, output: float, load: float,
-          loads: np.ndarray) -> float:
+          muscles: np.ndarray) -> float:
     """Return the x [N] under which the muscles give `output` [m] and bear `load` [N] each."""
     near = load - mean_input(wires, memories)
-    loads_for(wires, memories, output, load, near, loads)
-    here = load - mean_load(loads, near)
+    loads_for(wires, memories, output, load, near, muscles)
+    here = load - mean_load(muscles, near)
     if abs(here) <= wires.tolerance:
         return near
     x = root.begin(search, 0, near, here, search[GAIN] * here, -np.inf, np.inf, wires.tolerance)
     while root.searching(search, 0):
-        loads_for(wires, memories, output, load, x, loads)
-        x = root.proceed(search, 0, load - mean_load(loads, x))
+        loads_for(wires, memories, output, load, x, muscles)
+        x = root.proceed(search, 0, load - mean_load(muscles, x))
     keep_gain(search, 0, x - near, 1.0, here)
     return x
 
 
 @lean
 def respond(wires: Wires, memories: np.ndarray, search: np.ndarray, x: float, load: float,
-            low: float, high: float, near: float, inputs: np.ndarray) -> float:
+            low: float, high: float, near: float, muscles: np.ndarray, following: np.ndarray
+            ) -> float:
     """
-    Return the output [m] that the muscles give under x and a load, and put their inputs in place.
+    Return the output [m] that the muscles give under x and a load.
 
-    Commits nothing; the output is looked for between `low` and `high`, first at `near`.
+    Commits nothing; the output is looked for between `low` and `high`, first at `near`. The input
+    of each muscle and what its martensite keeps then go to `following`, shape (muscles, 4).
     """
     output = near = min(max(near, low), high)
-    loads_for(wires, memories, near, load, x, inputs)
-    here = load - mean_load(inputs, x)
+    loads_for(wires, memories, near, load, x, muscles)
+    here = load - mean_load(muscles, x)
     if abs(here) > wires.tolerance:
         output = root.begin(search, 0, near, here, TYPICAL_COMPLIANCE * search[GAIN] * here, low,
                             high, wires.tolerance)
         while root.searching(search, 0):
-            loads_for(wires, memories, output, load, x, inputs)
-            output = root.proceed(search, 0, load - mean_load(inputs, x))
+            loads_for(wires, memories, output, load, x, muscles)
+            output = root.proceed(search, 0, load - mean_load(muscles, x))
         if low < output < high:
             keep_gain(search, 0, output - near, TYPICAL_COMPLIANCE, here)
-    for i in range(len(inputs)):
-        inputs[i] = input_for(wires, memories[i], inputs[i], x)
+    for i in range(len(muscles)):
+        v = muscles[i, LOAD]
+        u = input_for(wires, memories[i], v, x)
+        for k in range(SIZE):
+            following[i, k] = muscles[i, k]
+        following[i, LOAD] = u
+        if wires.kept != 0.0:
+            keep(following, i, peek(wires.table, memories[i], u) - wires.base,
+                 scale_at(wires, v + x))
     return output

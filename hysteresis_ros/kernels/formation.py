@@ -1,39 +1,100 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What martensite keeps of the load under which it formed."""
+"""
+What martensite keeps of the load under which it formed.
+
+What is added has the strain of its moment; what goes back takes the mean strain along, as in the
+unified model of Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155. With P the elongation of
+the martensite that is there, S(F) the factor by which a load makes the strain larger, and y the
+output of H2 above its least::
+
+    dP = S(F) dy  where y grows,    dP = P dy / y  where it falls
+
+While y grows, S is taken to change evenly with it from one sample to the next.
+"""
 
 import numpy as np
 
 from .jit import jit
+from .lean import lean
+
+# What is remembered of each muscle: its load beyond x (see `bundle`); P [m]; S(F) at the last
+# sample, 0 before the first, whose martensite formed under its own load; and y [m].
+LOAD, FORMED, SCALE, OUTPUT = range(4)
+SIZE = 4
 
 
-@jit
-def formed(outputs: np.ndarray, scales: np.ndarray) -> np.ndarray:
+@lean
+def parts(kept: float, muscles: np.ndarray, i: int, output: float) -> tuple[float, float]:
     """
-    Return the elongation of martensite that keeps the strain with which it formed.
+    Return what the present load strains of an output, and what is kept whatever the load.
 
-    What is added has the strain of its moment; what goes back takes the mean strain along, as in
-    the unified model of Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155.
+    The elongation is the first times S(F), plus the second.
 
     Parameters
     ----------
+    kept : float
+        Share of the strain that is kept, 0 to 1; the rest is that of the present load.
+    muscles : ndarray, shape (muscles, 4)
+        What is remembered.
+    i : int
+        Which of them.
+    output : float
+        y of the present sample [m].
+    """
+    if kept == 0.0:
+        return output, 0.0
+    before = muscles[i, OUTPUT]
+    if output > before or before <= 0.0:
+        scale = muscles[i, SCALE]
+        share = 0.5 if scale > 0.0 else 1.0
+        change = output - before
+        return ((1.0 - kept) * output + kept * share * change,
+                kept * (muscles[i, FORMED] + (1.0 - share) * scale * change))
+    return (1.0 - kept) * output, kept * muscles[i, FORMED] * output / before
+
+
+@lean
+def keep(muscles: np.ndarray, i: int, output: float, scale: float) -> None:
+    """Remember an output y [m] of a muscle, reached under a load with the factor S(F)."""
+    strained, held = parts(1.0, muscles, i, output)
+    muscles[i, FORMED] = scale * strained + held
+    muscles[i, SCALE], muscles[i, OUTPUT] = scale, output
+
+
+@lean
+def output_for(kept: float, muscles: np.ndarray, i: int, wanted: float, scale: float) -> float:
+    """Return the output y [m] that gives an elongation [m] under a load with the factor S(F)."""
+    before = muscles[i, OUTPUT]
+    strained, held = parts(kept, muscles, i, before)
+    here = scale * strained + held
+    if wanted < here and before > 0.0:
+        return before * wanted / here
+    mean = 0.5 * (muscles[i, SCALE] + scale) if muscles[i, SCALE] > 0.0 else scale
+    return before + (wanted - here) / ((1.0 - kept) * scale + kept * mean)
+
+
+@jit
+def elongations(kept: float, outputs: np.ndarray, scales: np.ndarray) -> np.ndarray:
+    """
+    Return the elongation by the transformation, of which martensite keeps a share.
+
+    Parameters
+    ----------
+    kept : float
+        That share.
     outputs, scales : ndarray, shape (rows,)
-        Output of H2 above its least, and the factor by which the load of each row makes its
-        strain larger. The first row formed under its own load.
+        Output of H2 above its least, and S(F) of each row.
 
     Returns
     -------
     ndarray, shape (rows,)
 
     """
-    elongation = np.empty(len(outputs))
-    present = scales[0] * outputs[0]
-    elongation[0] = present
-    for n in range(1, len(outputs)):
-        change = outputs[n] - outputs[n - 1]
-        if change > 0.0:
-            present += scales[n] * change
-        elif change < 0.0:
-            present *= outputs[n] / outputs[n - 1]
-        elongation[n] = present
-    return elongation
+    muscles = np.zeros((1, SIZE))
+    found = np.empty(len(outputs))
+    for n in range(len(outputs)):
+        strained, held = parts(kept, muscles, 0, outputs[n])
+        found[n] = scales[n] * strained + held
+        keep(muscles, 0, outputs[n], scales[n])
+    return found

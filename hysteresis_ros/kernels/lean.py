@@ -19,3 +19,17 @@ def lean(function: Function) -> Function:
         options['_nrt'] = False
         options['no_cfunc_wrapper'] = True
     return compiled
+
+
+def inlined(function: Function) -> Function:
+    """
+    Return a lean kernel that is copied to where it is called.
+
+    For one that is called many times in a row: an arm and its state are a hundred numbers, and to
+    hand them on takes longer than what is then done.
+    """
+    compiled = lean(function)
+    options = getattr(compiled, 'targetoptions', None)
+    if options is not None:
+        options['forceinline'] = True
+    return compiled

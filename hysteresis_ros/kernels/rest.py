@@ -12,9 +12,10 @@ import numpy as np
 
 from . import bundle, grid, root
 from .arm import (
-    ANGLE, Arm, BUNDLE_SEARCH, DEMAND, demand_at, LINE, LOAD, place, present, required, REST_GAIN,
-    REST_SEARCH, State, width)
-from .lean import lean
+    ANGLE, Arm, BUNDLE_SEARCH, DEMAND, demand_at, factor_at, LINE, LOAD, place, present, required,
+    REST_GAIN, REST_SEARCH, State, width)
+from .formation import keep, LOAD as BEYOND, parts
+from .lean import inlined, lean
 from .operator import last_input, last_output, peek, solve, step
 
 
@@ -36,10 +37,22 @@ def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: f
                 motion, REST_SEARCH, _lacking(arm, state, line, u, x, offset, factor, play))
         motion[REST_GAIN] = min(max((u - start) / here, 0.5), 10.0)
         step(table, memory, u)
-    return place(arm, motion, line, factor * (last_output(table, memory) - arm.base), offset)
+    output = last_output(table, memory) - arm.base
+    k, share = _place(arm, state, line, output, offset, factor)
+    if arm.wires.kept != 0.0:
+        keep(state.muscles, 0, output, factor_at(arm, line, k, share))
+    return k, share
 
 
-@lean
+@inlined
+def _place(arm: Arm, state: State, line: int, output: float, offset: float, factor: float
+           ) -> tuple[int, float]:
+    """Return the place at which one muscle's H2 gives an output above its least [m]."""
+    strained, held = parts(arm.wires.kept, state.muscles, 0, output)
+    return place(arm, state.motion, line, factor * strained, offset + factor * held)
+
+
+@inlined
 def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: float, factor: float,
              play: float) -> float:
     """
@@ -48,7 +61,7 @@ def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: floa
     `play` is the share of the play that is taken up: 0 where the muscle heats, 1 where it cools.
     """
     output = peek(arm.wires.table, state.memories[0], u)
-    k, share = place(arm, state.motion, line, factor * (output - arm.base), offset)
+    k, share = _place(arm, state, line, output - arm.base, offset, factor)
     load = grid.between(arm.grid, LOAD + LINE * line, k, share)
     return load - play * width(arm, line, k, share) - x - u
 
@@ -78,7 +91,7 @@ def settle_bundle(arm: Arm, state: State, line: int, x: float, offset: float, fa
             point = root.proceed(motion, BUNDLE_SEARCH, missing)
         if 0.0 < point < last:
             bundle.keep_gain(motion, BUNDLE_SEARCH, point - near, scale, here)
-    bundle.commit(arm.wires, state.memories, state.loads, x)
+    bundle.commit(arm.wires, state.memories, state.muscles, x)
     return k, share
 
 
@@ -89,9 +102,12 @@ def _lacking_bundle(arm: Arm, state: State, line: int, point: float, x: float, o
     k = min(int(point), len(arm.grid) - 2) + 1
     share = point - (k - 1)
     output = arm.base + demand_at(arm, line, k, share, offset) / factor
-    load = required(arm, state.motion, line, k, share, dt)
-    bundle.loads_for(arm.wires, state.memories, output, load, x, state.loads)
-    return k, share, load - bundle.mean_load(state.loads, x)
+    load = at_rest = required(arm, state.motion, line, k, share, dt)
+    if arm.wires.kept != 0.0:
+        # What was kept does not strain with the load: the demand is that of the arm at rest.
+        at_rest = required(arm, state.motion, line, k, share, 0.0)
+    bundle.loads_for(arm.wires, state.memories, output, at_rest, x, state.muscles)
+    return k, share, load - bundle.mean_load(state.muscles, x)
 
 
 @lean
@@ -115,22 +131,31 @@ def direction(arm: Arm, state: State, x: float, offset: float, factor: float, dt
         drag = root.proceed(motion, REST_SEARCH, _lacking_held(
             arm, state, k, share, drag, x, offset, factor, dt))
     # The arm stands still, but its load has changed, and with it what the load does.
-    bundle.commit(arm.wires, state.memories, state.loads, x)
+    bundle.commit(arm.wires, state.memories, state.muscles, x)
     return 0
 
 
-@lean
+@inlined
 def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: float,
                   offset: float, factor: float, dt: float) -> float:
     """Return the load that is missing where friction takes a part, -1 to 1, of what it can."""
     edge, part = 1 if drag > 0.0 else 2, abs(drag)
     demand = demand_at(arm, 0, k, share, offset)
     demand += part * (demand_at(arm, edge, k, share, offset) - demand)
-    load = required(arm, state.motion, 0, k, share, dt)
-    load += part * (required(arm, state.motion, edge, k, share, dt) - load)
+    load = at_rest = _required_held(arm, state, edge, k, share, part, dt)
+    if arm.wires.kept != 0.0:
+        at_rest = _required_held(arm, state, edge, k, share, part, 0.0)
     output = arm.base + demand / factor
-    if arm.plays or len(arm.wires.offsets) > 1:
-        bundle.loads_for(arm.wires, state.memories, output, load, x, state.loads)
+    if arm.plays or arm.wires.kept != 0.0 or len(arm.wires.offsets) > 1:
+        bundle.loads_for(arm.wires, state.memories, output, at_rest, x, state.muscles)
     else:
-        state.loads[0] = solve(arm.wires.table, state.memories[0], output)[0]
-    return load - bundle.mean_load(state.loads, x)
+        state.muscles[0, BEYOND] = solve(arm.wires.table, state.memories[0], output)[0]
+    return load - bundle.mean_load(state.muscles, x)
+
+
+@inlined
+def _required_held(arm: Arm, state: State, edge: int, k: int, share: float, part: float,
+                   dt: float) -> float:
+    """Return the load that the arm asks for where friction takes a part of what it can."""
+    load = required(arm, state.motion, 0, k, share, dt)
+    return load + part * (required(arm, state.motion, edge, k, share, dt) - load)

@@ -16,9 +16,10 @@ from .arm import (
     Arm, INSIDE, LENGTH, LEVERAGE, LOOP, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD, REST_SEARCH, SCALE,
     State, STRETCH, SWING_GAIN, THETA)
 from .bundle import TYPICAL_COMPLIANCE
+from .formation import keep, parts
 from .lean import lean
 from .load_play import held
-from .operator import last_input, peek, step
+from .operator import last_input, last_output, peek, step
 
 # Least share of a load that is missing by which the load changes in a dt.
 LEAST_GAIN = 1e-3
@@ -68,6 +69,10 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
         u = arm.loads[0, INSIDE] - x
         k, share = _fly(arm, drag, slope)
     step(table, memory, _input(arm, state, u, x))
+    if arm.wires.kept != 0.0:
+        n, part = _load_at(arm, state, u, x)
+        keep(state.muscles, 0, last_output(table, memory) - arm.base,
+             grid.between(arm.loads, SCALE, n, max(part, 0.0)))
     return k, share
 
 
@@ -108,17 +113,24 @@ def _lacking(arm: Arm, state: State, u: float, x: float, offset: float, factor: 
 def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: float
             ) -> tuple[float, float]:
     """Return the load of the muscle that is u beyond x, as it feels it, and its elongation."""
-    n = grid.interval(arm.loads, INSIDE, u + x, int(state.motion[NEAR_LOAD]))
-    state.motion[NEAR_LOAD] = n
-    part = (u + x - arm.loads[n - 1, INSIDE]) / (
-        arm.loads[n, INSIDE] - arm.loads[n - 1, INSIDE])
+    n, part = _load_at(arm, state, u, x)
     load = (n - 1 + part) * arm.spacing
     # A loose muscle's load goes on falling, so that the root can be found.
     part = max(part, 0.0)
     scale = grid.between(arm.loads, SCALE, n, part)
     output = peek(arm.wires.table, state.memories[0], _input(arm, state, u, x))
-    return load, (arm.base + scale * factor * (output - arm.base)
+    strained, held = parts(arm.wires.kept, state.muscles, 0, output - arm.base)
+    return load, (arm.base + (scale * factor * strained + factor * held)
                   + grid.between(arm.loads, STRETCH, n, part) + offset)
+
+
+@lean
+def _load_at(arm: Arm, state: State, u: float, x: float) -> tuple[int, float]:
+    """Return the place in the table of loads of the muscle that is u beyond x."""
+    n = grid.interval(arm.loads, INSIDE, u + x, int(state.motion[NEAR_LOAD]))
+    state.motion[NEAR_LOAD] = n
+    return n, (u + x - arm.loads[n - 1, INSIDE]) / (
+        arm.loads[n, INSIDE] - arm.loads[n - 1, INSIDE])
 
 
 @lean
@@ -126,9 +138,7 @@ def _input(arm: Arm, state: State, u: float, x: float) -> float:
     """Return the input of H2 for a load that is u beyond x, as the transformation feels it."""
     if not arm.plays:
         return u
-    n = grid.interval(arm.loads, INSIDE, u + x, int(state.motion[NEAR_LOAD]))
-    part = (u + x - arm.loads[n - 1, INSIDE]) / (
-        arm.loads[n, INSIDE] - arm.loads[n - 1, INSIDE])
+    n, part = _load_at(arm, state, u, x)
     loop = max(grid.between(arm.loads, LOOP, n, part), 0.0)
     return held(last_input(arm.wires.table, state.memories[0]), u, loop)
 

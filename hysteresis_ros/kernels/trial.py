@@ -15,8 +15,10 @@ import numpy as np
 
 from . import bundle, grid
 from .arm import (
-    ACCELERATION, ANGLE, Arm, BEFORE_DT, BUNDLE_SEARCH, INERTIAL_RATIO, keep_motion, NEAR,
-    NEAR_LENGTH, NEAR_LOAD, present, REST_GAIN, RINGING, State, SWING_GAIN, THETA, VELOCITY, X)
+    ACCELERATION, ANGLE, Arm, BEFORE_DT, BUNDLE_SEARCH, INERTIAL_RATIO, keep_motion, LOAD, NEAR,
+    NEAR_LENGTH, NEAR_LOAD, place, present, REST_GAIN, RINGING, State, SWING_GAIN, THETA, VELOCITY,
+    X)
+from .formation import LOAD as BEYOND, SIZE
 from .jit import jit
 from .lean import lean
 from .operator import last_input, last_output, reset
@@ -30,6 +32,8 @@ MOST_PIECES = 200
 # An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
 # that is small, does not ring, and is followed at a longer dt; the share fades from piece to piece.
 CALM, FADING = 0.005, 0.97
+# Samples in which a muscle that keeps strain cools down before a trial.
+COOLING = 40
 
 
 @lean
@@ -37,7 +41,9 @@ def start(arm: Arm, state: State) -> None:
     """Wipe the memory: after a full heat and cool cycle, before the first sample."""
     for i in range(len(arm.wires.offsets)):
         reset(arm.wires.table, state.memories[i])
-        state.loads[i] = last_input(arm.wires.table, state.memories[i])
+        for k in range(SIZE):
+            state.muscles[i, k] = 0.0
+        state.muscles[i, BEYOND] = last_input(arm.wires.table, state.memories[i])
     motion = state.motion
     motion[:] = 0.0
     motion[ANGLE] = motion[BEFORE_DT] = np.nan
@@ -133,6 +139,20 @@ def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor:
     return angle
 
 
+@lean
+def cool_down(arm: Arm, state: State, x: float, offset: float) -> float:
+    """Wipe the memory, cool down to the state of rest under x and an offset; return its angle."""
+    start(arm, state)
+    if arm.wires.kept != 0.0:
+        # What forms on the way down remembers the loads that it meets there.
+        k, share = place(arm, state.motion, 0, 0.0, 0.0)
+        hot = grid.between(arm.grid, LOAD, k, share) - last_input(
+            arm.wires.table, state.memories[0])
+        for n in range(COOLING):
+            step(arm, state, max(hot + n / COOLING * (x - hot), x), np.inf, offset, 1.0)
+    return step(arm, state, x, np.inf, offset, 1.0)
+
+
 @jit
 def proceed(arm: Arm, state: State, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
             factor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -175,8 +195,7 @@ def run(arm: Arm, state: State, cold: float, ends: np.ndarray, x: np.ndarray, dt
     angles, outputs, inputs = np.empty(rows), np.empty(rows), np.empty(rows)
     rest, begin = np.nan, 0
     for end in ends:
-        start(arm, state)
-        rest = step(arm, state, cold, np.inf, 0.0, 1.0)
+        rest = cool_down(arm, state, cold, 0.0)
         for n in range(begin, end):
             angles[n] = step(arm, state, x[n], dt[n], offset[n], factor[n])
             outputs[n] = output(arm, state)

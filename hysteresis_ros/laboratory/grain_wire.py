@@ -57,6 +57,9 @@ class GrainMaterial(Material):
         Heating temperature of the R-phase's middle, its hysteresis, and its spread [degC, K, K].
     early_clausius_clapeyron : float
         C of the R-phase, steeper than that of the martensite [Pa/K].
+    kept_strain : float
+        Share of the strain that grains keep from the stress under which they turned to martensite,
+        until they turn back; 0: none.
     """
 
     name: ClassVar[str] = 'grains'
@@ -79,6 +82,12 @@ class GrainMaterial(Material):
     early_loop: float = 3.0
     early_spread: float = 6.0
     early_clausius_clapeyron: float = 16e6
+    kept_strain: float = 0.0
+
+    @property
+    def temperature_step(self) -> float:    # type: ignore[override]
+        """Largest change of temperature at once [K]; finite where grains keep their strain."""
+        return 1.0 if self.kept_strain > 0.0 else math.inf
 
     @classmethod
     def specimen(cls, rng: np.random.Generator) -> 'GrainMaterial':
@@ -116,12 +125,17 @@ class GrainMaterial(Material):
         """Return the same with an R-phase of a strain before the martensite."""
         return dataclasses.replace(self, early_strain=strain)
 
+    def with_kept_strain(self, share: float) -> 'GrainMaterial':
+        """Return the same with grains that keep a share of the strain they formed with."""
+        return dataclasses.replace(self, kept_strain=share)
+
     def transformation_strain(self, stress: float) -> float:
         """Return H(sigma) for a stress [Pa]."""
         return self.strain_without_load + (self.largest_strain - self.strain_without_load) * (
             1.0 - math.exp(-max(stress, 0.0) / self.orienting_stress))
 
-    def strain(self, martensite: float, early: float, stress: float) -> float:
+    def strain(self, martensite: float, early: float, stress: float,
+               formed: float | None = None) -> float:
         """
         Return the strain against the unloaded austenite.
 
@@ -131,11 +145,15 @@ class GrainMaterial(Material):
             Shares of martensite and of R-phase (or beyond) in [0, 1].
         stress : float
             Tension over cross section [Pa].
+        formed : float, optional
+            Mean strain with which the martensite formed; by default that of the present stress.
         """
         compliance = (martensite / self.martensite_modulus
                       + (1.0 - martensite) / self.austenite_modulus)
-        return (stress * compliance + self.transformation_strain(stress) * martensite
-                + self.early_strain * early)
+        mean = self.transformation_strain(stress)
+        if formed is not None:
+            mean += self.kept_strain * (formed - mean)
+        return stress * compliance + mean * martensite + self.early_strain * early
 
 
 class GrainWire(Wire):
@@ -162,6 +180,8 @@ class GrainWire(Wire):
         """Heat until all is austenite, cool, and so wipe the memory; see `Wire`."""
         material = self.material
         self._grains = Grains(self._heating, self._cooling)
+        # Strain of all martensite as it formed, times its share.
+        self._formed = material.strain_without_load
         self._early = None
         if material.early_strain > 0.0:
             middle = material.early_temperature + material.early_spread * np.linspace(-1.0, 1.0, 40)
@@ -192,17 +212,40 @@ class GrainWire(Wire):
         if self._early is not None:
             felt = temperature - self._early_shift * stress
             early = self._early.peek(felt, felt)
-        return self._strain(self._peek(temperature, stress), early, stress)
+        formed = self._formed_at(temperature, stress) if self._keeps else 0.0
+        return self._strain(self._peek(temperature, stress), early, stress, formed)
+
+    @property
+    def _keeps(self) -> bool:
+        return self.material.kept_strain > 0.0
+
+    def _formed_at(self, temperature: float, stress: float) -> float:
+        """
+        Return the strain, times its share, that the martensite would remember.
+
+        Grains hold each other: one that turns to martensite brings the strain of that moment in,
+        and one that turns back takes the mean of all out.
+        """
+        before = self._grains.martensite
+        change = self._grains.turned(temperature - self._shift * stress,
+                                     temperature - self._cooling_shift * stress) - before
+        mean = self._formed / max(float(before.mean()), 1e-12)
+        strain = self.material.transformation_strain(stress)
+        return self._formed + (strain * float(np.maximum(change, 0.0).mean())
+                               + mean * float(np.minimum(change, 0.0).mean()))
 
     def _commit_strain(self, temperature: float, stress: float) -> float:
+        if self._keeps:
+            self._formed = self._formed_at(temperature, stress)
         self._martensite = self._grains.commit(temperature - self._shift * stress,
                                                temperature - self._cooling_shift * stress)
         early = 1.0
         if self._early is not None:
             felt = temperature - self._early_shift * stress
             early = self._early.commit(felt, felt)
-        return self._strain(self._martensite, early, stress)
+        return self._strain(self._martensite, early, stress, self._formed)
 
-    def _strain(self, martensite: float, early: float, stress: float) -> float:
+    def _strain(self, martensite: float, early: float, stress: float, formed: float) -> float:
+        mean = formed / max(martensite, 1e-12) if self._keeps else None
         martensite = self.retained + (1.0 - self.retained) * martensite
-        return self.material.strain(martensite, early, stress)
+        return self.material.strain(martensite, early, stress, mean)

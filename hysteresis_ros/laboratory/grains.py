@@ -123,3 +123,7 @@ class Grains:
     def martensite(self) -> np.ndarray:
         """Martensite share of each grain, shape (count,)."""
         return self._share.copy()
+
+    def turned(self, heating: float, cooling: float) -> np.ndarray:
+        """Return the share that each grain would have, shape (count,); their state stays."""
+        return self._turn(heating, cooling).copy()

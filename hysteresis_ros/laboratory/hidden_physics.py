@@ -143,6 +143,11 @@ def _r_phase(conditions: Conditions, size: float, specimen: np.random.Generator,
     conditions.material = conditions.material.with_early_phase(0.0085 * size)
 
 
+def _formation_memory(conditions: Conditions, size: float, specimen: np.random.Generator,
+                      recording: np.random.Generator) -> None:
+    conditions.material = conditions.material.with_kept_strain(min(0.85 * size, 1.0))
+
+
 def _creep(conditions: Conditions, size: float, specimen: np.random.Generator,
            recording: np.random.Generator) -> None:
     conditions.creep = 0.004 * size
@@ -323,6 +328,8 @@ LATER = {
                         'constant 4 s in the air of the bench).', _heat_loss),
     'overload': Effect('The arm loads its wires beyond their yield stress, and they stay longer.',
                        _overload),
+    'formation_memory': Effect('Martensite keeps the strain of the load under which it formed.',
+                               _formation_memory, bench=True),
 }
 
 # Here stood a torn wire while no catalogue had it.

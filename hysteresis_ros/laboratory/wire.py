@@ -83,6 +83,10 @@ class Material(abc.ABC):
         """Return the same with an R-phase of a strain before the martensite."""
         raise self._lacks('r_phase')
 
+    def with_kept_strain(self, share: float) -> 'Material':
+        """Return the same with martensite that keeps a share of the strain it formed with."""
+        raise self._lacks('formation_memory')
+
     def _lacks(self, effect: str) -> ParameterError:
         return ParameterError(f'laboratory: a {self.name} muscle cannot have {effect}: its '
                               'constitutive equations have no such constant; choose another '

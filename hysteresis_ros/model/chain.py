@@ -204,6 +204,13 @@ class Chain:
         return shifted + share * load * (strain - 1.0)
 
     @property
+    def keeps_strain(self) -> float:
+        """Share, 0 to 1, of its strain that martensite keeps; 0 where no load changes it."""
+        if not self._scaling:
+            return 0.0
+        return min(sum((effect.keeps_strain for effect in self.material), 0.0), 1.0)
+
+    @property
     def plays(self) -> bool:
         """Whether the loop's width depends on the load."""
         return bool(self._playing)

@@ -57,11 +57,11 @@ class Setpoint(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a drive would do: `length` [m], `drive_squared`, and the `inputs` of the muscles."""
+    """What a drive would do: `length` [m], `drive_squared`, and what the muscles commit."""
 
     length: float
     drive_squared: float
-    inputs: list[float]
+    following: np.ndarray
 
 
 class Controller:
@@ -141,7 +141,7 @@ class Controller:
             self._targets = Targets(model.geometry, self._chain, lambda: self._at_rest()[0])
         self.rate_limit = rate_limit
         self.angle_dead_band = angle_dead_band
-        self._rest: tuple[float, list[float]] | None = None
+        self._rest: tuple[float, np.ndarray] | None = None
         self._arm = arm
         self.reset()
 
@@ -274,12 +274,12 @@ class Controller:
         self._arm = True
         return found
 
-    def _at_rest(self) -> tuple[float, list[float]]:
-        """Angle of the cold arm, and what its muscles' memories start from."""
+    def _at_rest(self) -> tuple[float, np.ndarray]:
+        """Angle of the cold arm, and what its muscles start from, shape (muscles, 4)."""
         if self._rest is None:
             balance = self.model.balance(self.model.chain())
             angle = balance.settle(self._cold)
-            self._rest = angle, [operator.input for operator in balance.operators]
+            self._rest = angle, balance.muscles
         return self._rest
 
     def force_setpoint(self, force: float, commit: bool = True, ambient: float = math.nan,
@@ -404,7 +404,8 @@ class Controller:
 
     def _share(self, length: float, force: float) -> float:
         """Return the share of martensite at a length [m] under a force [N]."""
-        return float(self.model.martensite(self._transformed(length, force)))
+        return float(self.model.martensite(
+            self._second.given(self._transformed(length, force), force)))
 
     def _invert(self, length: float, force: float, inputs: Inputs) -> tuple[float, bool]:
         """Drive in closed form, and whether it is out of reach."""
@@ -452,7 +453,7 @@ class Controller:
 
     def _commit(self, drive: float, outcome: Outcome, inputs: Inputs, time: float | None) -> float:
         self._first.step(outcome.drive_squared)
-        self._second.step(outcome.inputs)
+        self._second.step(outcome.following)
         self._steady.advance(drive, outcome.drive_squared, self._worn(inputs, drive))
         self._fresh = False
         if math.isfinite(inputs.ambient):

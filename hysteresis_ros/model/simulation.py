@@ -15,6 +15,7 @@ import numpy as np
 from hysteresis_ros.bicep.balance import ArmBalance, statics_of
 from hysteresis_ros.effects import Effect, Inputs
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.kernels.formation import elongations
 from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.kernels.thinned import balanced_rows, between
 from hysteresis_ros.model.chain import Chain
@@ -355,18 +356,24 @@ class Simulator:
             width = chain.loop_width(trial.load)
             given = follow(given, np.concatenate((width[:1], width)), np.array([len(given)]))
         stage.reset()
-        stage.step(given[0])
+        rest = stage.step(given[0])
         output = stage.simulate(given[1:])
         base = stage.output_range[0]
         offset, factor = chain.drift(trial.drive, drive_squared, trial.inputs)
-        return Response(base + chain.scale(trial.load) * factor * (output - base)
-                        + chain.stretch(trial.load) + offset, output)
+        scale, kept = chain.scale(trial.load), chain.keeps_strain
+        if kept:
+            transformed = factor * elongations(
+                kept, np.concatenate(([rest], output)) - base,
+                np.concatenate((scale[:1], scale)))[1:]
+        else:
+            transformed = scale * factor * (output - base)
+        return Response(base + transformed + chain.stretch(trial.load) + offset, output)
 
     def _angles(self, chain: Chain, first: FirstStage, balance: Lifting,
                 asked: np.ndarray | None, trials: Sequence[Trial]) -> list[Response]:
         """Return what the arm does; the trials run in one call of the kernel."""
-        # The phase is looked at in all rows.
-        spacing = SPACING * balance.span if chain.needs_phase else np.inf
+        # The phase is looked at in all rows, and what martensite keeps is an integral over them.
+        spacing = SPACING * balance.span if chain.needs_phase or chain.keeps_strain else np.inf
         cold, columns, rows = 0.0, [], []
         for trial in trials:
             cold, x, drive_squared = self._first(chain, first, trial)
