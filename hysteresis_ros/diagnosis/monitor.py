@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # Share of the range of the drive that is no change of it.
 HELD = 1e-3
 # Time [s] over which the share of a core can be saved up.
-SAVING = 480.0
+SAVING = 120.0
 
 # Takes whether a diagnosis was made, and what it says or why not.
 Answer = Callable[[bool, str], None]
