@@ -8,12 +8,13 @@ import numpy as np
 
 from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.thermal import FASTEST, FirstOrderLag, LAGS
+from hysteresis_ros.false_position import false_position
 from hysteresis_ros.kernels.lag import approach, growing_lag
 
 # Share of the way that an input is taken to be good for, at least: it is finite in no time, too.
 LEAST_SHARE = 1e-3
-# An input is found to this share of the full drive squared, in so many trials at most.
-TOLERANCE, MOST_TRIALS = 1e-13, 100
+# An input is found to this share of the full drive squared.
+TOLERANCE = 1e-13
 
 
 class HeatLoss(FirstOrderLag):
@@ -84,23 +85,11 @@ class HeatLoss(FirstOrderLag):
 
         def missing(value: float) -> float:
             return self._after(q, value, inputs.dt, surroundings) - signal
-        near, far = signal, furthest
-        lacking, beyond = missing(near), missing(far)
+        lacking, beyond = missing(signal), missing(furthest)
         if lacking * beyond >= 0.0:
             return furthest
-        # False position, where an end that stays counts half (the Illinois method).
-        value, enough = near, TOLERANCE * (surroundings.full_drive_squared or 1.0)
-        for _ in range(MOST_TRIALS):
-            value = near + (far - near) * lacking / (lacking - beyond)
-            error = missing(value)
-            if abs(error) <= enough:
-                break
-            if error * beyond < 0.0:
-                near, lacking = far, beyond
-            else:
-                lacking *= 0.5
-            far, beyond = value, error
-        return value
+        return false_position(missing, (signal, lacking), (furthest, beyond),
+                              TOLERANCE * (surroundings.full_drive_squared or 1.0))
 
     def _after(self, q: float, value: float, dt: float, surroundings: Surroundings) -> float:
         rate = self.rate(True)

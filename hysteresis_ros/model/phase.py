@@ -4,9 +4,10 @@
 
 from collections.abc import Callable
 
+from hysteresis_ros.false_position import false_position
+
 # Shares that agree to this are the same.
 TOLERANCE = 1e-8
-MOST_TRIALS = 60
 
 
 def agree(caused: Callable[[float], float], start: float) -> float:
@@ -24,9 +25,8 @@ def agree(caused: Callable[[float], float], start: float) -> float:
     Returns
     -------
     float
-        The root of ``caused(share) - share``, by false position that cannot stall (the Illinois
-        method); it always exists, because what is caused lies between 0 and 1. Where the muscle
-        jumps, it is the place of the jump.
+        The root of ``caused(share) - share``; it always exists, because what is caused lies between
+        0 and 1. Where the muscle jumps, it is the place of the jump.
     """
     near, here = start, caused(start) - start
     if abs(here) <= TOLERANCE:
@@ -38,14 +38,5 @@ def agree(caused: Callable[[float], float], start: float) -> float:
         near, here = far, there
         far = 1.0 if here > 0.0 else 0.0
         there = caused(far) - far
-    for _ in range(MOST_TRIALS):
-        if abs(there) <= TOLERANCE or abs(far - near) <= TOLERANCE or there == here:
-            break
-        share = far - there * (far - near) / (there - here)
-        value = caused(share) - share
-        if value * there < 0.0:
-            near, here = far, there
-        else:
-            here *= 0.5
-        far, there = share, value
-    return far
+    return false_position(lambda share: caused(share) - share, (near, here), (far, there),
+                          TOLERANCE, TOLERANCE)
