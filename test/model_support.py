@@ -65,6 +65,16 @@ def preisach(lower, upper, levels, lowest, highest, width):
     return Preisach(nodes, weights, lowest - low)
 
 
+def bladder(effects=()):
+    """Return a model of a muscle that pressure shortens."""
+    return MuscleModel(
+        kind='two-stage', drive='pressure', load_name='force', response='length',
+        force_stage=preisach(0.0, 3e5, 6, 0.0, 300.0, 2e4),
+        length_stage=preisach(-300.0, 200.0, 10, -0.06, 0.005, 40.0),
+        ranges={'pressure': (0.0, 3e5), 'length': (-0.06, 0.005), 'force': (0.0, 300.0)},
+        mean_load=100.0).with_effects(list(effects))
+
+
 def bicep_model(effects=(), **changes):
     """Return a model whose arm goes from about 60 to 115 degrees."""
     model = MuscleModel(

@@ -17,8 +17,7 @@ from hysteresis_ros.laboratory.hidden_soft import with_effects
 from hysteresis_ros.laboratory.mckibben import McKibbenMaterial
 from hysteresis_ros.laboratory.soft_bench import SoftBench
 from hysteresis_ros.measurements import Measurement
-from hysteresis_ros.model import MuscleModel
-from model_support import preisach
+from model_support import bladder
 
 BLADDER = Surroundings(0.3, 100.0, 3e5, 0.06, drive='pressure')
 LAGS_OF_HEAT = {'thermal_lag', 'heating_cooling_asymmetry', 'latent_heat'}
@@ -27,16 +26,6 @@ LAGS_OF_HEAT = {'thermal_lag', 'heating_cooling_asymmetry', 'latent_heat'}
 def valve(filling, venting):
     """Return the effect with its times [s]."""
     return catalogue()['valve_lag'](BLADDER, filling=filling, venting=venting)
-
-
-def bladder(effects=()):
-    """Return a model of a muscle that pressure shortens."""
-    return MuscleModel(
-        kind='two-stage', drive='pressure', load_name='force', response='length',
-        force_stage=preisach(0.0, 3e5, 6, 0.0, 300.0, 2e4),
-        length_stage=preisach(-300.0, 200.0, 10, -0.06, 0.005, 40.0),
-        ranges={'pressure': (0.0, 3e5), 'length': (-0.06, 0.005), 'force': (0.0, 300.0)},
-        mean_load=100.0).with_effects(list(effects))
 
 
 def recording(model, dt=0.2, seed=3):

@@ -17,8 +17,7 @@ from hysteresis_ros.laboratory.scp import ScpMaterial
 from hysteresis_ros.laboratory.soft_bench import SoftBench
 from hysteresis_ros.laboratory.tendon import Tendon
 from hysteresis_ros.measurements import Measurement
-from hysteresis_ros.model import MuscleModel
-from model_support import arm_run, bicep_model, preisach, wandering_voltage
+from model_support import arm_run, bicep_model, bladder, wandering_voltage
 
 BLADDER = Surroundings(0.3, 100.0, 3e5, 0.06, drive='pressure')
 
@@ -42,16 +41,6 @@ def course(made, inputs, surroundings=BLADDER):
     offset, factor = made.drift(drive, drive, inputs, surroundings)
     assert np.all(factor == 1.0)
     return offset
-
-
-def bladder(effects=()):
-    """Return a model of a muscle that pressure shortens."""
-    return MuscleModel(
-        kind='two-stage', drive='pressure', load_name='force', response='length',
-        force_stage=preisach(0.0, 3e5, 6, 0.0, 300.0, 2e4),
-        length_stage=preisach(-300.0, 200.0, 8, -0.06, 0.005, 40.0),
-        ranges={'pressure': (0.0, 3e5), 'length': (-0.06, 0.005), 'force': (0.0, 300.0)},
-        mean_load=100.0).with_effects(list(effects))
 
 
 def bench(model, name='pressure', highest=3e5):
