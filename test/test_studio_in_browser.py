@@ -32,8 +32,10 @@ class Tab:
         self.browser, self.address = browser, address
 
     def open(self, width=1300, height=900):
-        """Load the page and wait until it shows its errors."""
+        """Load the page and wait until it shows its errors and the server hears it."""
         self.browser.open(self.address, width, height)
+        # What is done before is sent after, in any order: a click before the words typed.
+        self.until(lambda: self.browser.run('window.did_handshake'))
         self.until(lambda: self.text('.number .now') and self.count('.effect') > 5)
 
     def until(self, condition):
