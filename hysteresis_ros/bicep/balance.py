@@ -83,7 +83,7 @@ class ArmBalance:
         self.span = operator.upper - operator.lower
         several = len(chain.offsets) > 1
         wires, self.operators, memories = wires_of(operator, chain, loaded)
-        self._held = statics.theta, statics.moment, leverage
+        self._load_at = statics.theta, np.maximum(statics.moment, 0.0) / leverage
         # At rest, and where the arm sinks and rises against dry friction.
         senses = (0, 1, -1) if sticks else (0,)
         lines = [_line(statics, leverage * grip ** sense, sense * self.coulomb, self.base, chain,
@@ -145,10 +145,9 @@ class ArmBalance:
         """Output of H2 [m], which follows the martensite share; the mean of the muscles."""
         return self._kernels.output(self._arm, self._state)
 
-    def load(self, angle: float) -> float:
-        """Return the load [N] of each muscle that holds the arm at rest at an angle [rad]."""
-        theta, moment, leverage = self._held
-        return float(np.interp(angle, theta, np.maximum(moment, 0.0) / leverage))
+    def load(self, angle: Any, clock: Any = 0.0) -> Any:
+        """Return the load [N] of each muscle that holds the arm at rest at each angle [rad]."""
+        return np.interp(angle, *self._load_at)
 
     @property
     def muscles(self) -> np.ndarray:
@@ -210,8 +209,8 @@ class ArmBalance:
         return self._kernels.run(self._arm, self._state, float(cold), ends, *(
             np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))
 
-    def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray
-                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
+                clock: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Go on from the present state; angles, outputs and inputs (rows,) as of `run`."""
         return self._kernels.proceed(self._arm, self._state, *(
             np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))

@@ -61,9 +61,10 @@ class BreakingBalance:
         """H2 of each muscle that is told from the others."""
         return self._present.operators
 
-    def load(self, angle: float) -> float:
-        """Return the load [N] of each muscle at an angle [rad]; see `ArmBalance`."""
-        return self._present.load(angle)
+    def load(self, angle: Any, clock: Any) -> Any:
+        """Return the load [N] of each muscle at each angle [rad] and time [s]; see `ArmBalance`."""
+        return np.where(np.asarray(clock) > self.time, self._broken.load(angle),
+                        self._intact.load(angle))
 
     def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
         """Wipe the memory, take up the state of rest under `x` at `clock` [s]; see `ArmBalance`."""
@@ -73,12 +74,11 @@ class BreakingBalance:
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
              clock: float = 0.0) -> float:
         """Advance to the next sample, at `clock` [s]; see `ArmBalance`."""
-        if self._present is self._broken or clock <= self.time:
-            return self._present.step(x, dt, offset, factor)
-        self._broken.take_over(self._intact)
-        self._present = self._broken
-        before, after = (one.step(x, dt, offset, factor) for one in (self._intact, self._broken))
-        return _on_its_way(before, after, clock - self.time, dt)
+        if clock <= self.time and self._present is self._intact:
+            return self._intact.step(x, dt, offset, factor)
+        before = self._break_before(x, dt, offset, factor)
+        after = self._broken.step(x, dt, offset, factor)
+        return after if before is None else _on_its_way(before, after, clock - self.time, dt)
 
     def run(self, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
             factor: np.ndarray, clock: np.ndarray
@@ -100,29 +100,37 @@ class BreakingBalance:
         angles, outputs, inputs : ndarray, shape (rows,)
             As of `ArmBalance.run`.
         """
-        columns = np.array([x, dt, offset, factor])
+        columns = np.array([x, dt, offset, factor, clock])
         rests, found, begin = [], np.empty((3, len(x))), 0
         for end in np.asarray(ends).tolist():
             own = slice(begin, end)
-            rest, *found[:, own] = self._trial(cold, columns[:, own], clock[own])
-            rests.append(rest)
+            rests.append(self.settle(cold, float(clock[begin] - dt[begin])))
+            found[:, own] = self.proceed(*columns[:, own])
             begin = end
         return np.array(rests), *found
 
-    def _trial(self, cold: float, columns: np.ndarray, clock: np.ndarray) -> tuple:
-        """Return rest, angles, outputs and inputs of one trial."""
-        first = int(np.searchsorted(clock, self.time, 'right'))
-        starts_broken = bool(clock[0] - columns[1, 0] > self.time)
-        if starts_broken or first == len(clock):
-            arm = self._broken if starts_broken else self._intact
-            return arm.run(cold, np.array([len(clock)]), *columns)
-        rest, *head = self._intact.run(cold, np.array([first]), *columns[:, :first])
+    def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
+                clock: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Go on from the present state; angles, outputs and inputs (rows,) as of `run`."""
+        columns = np.array([x, dt, offset, factor])
+        first = 0 if self._present is self._broken else int(
+            np.searchsorted(clock, self.time, 'right'))
+        parts = [self._present.proceed(*columns[:, :first])] if first else []
+        if first < len(clock):
+            before = self._break_before(*columns[:, first].tolist())
+            rest = self._broken.proceed(*columns[:, first:])
+            if before is not None:
+                rest[0][0] = _on_its_way(before, rest[0][0], clock[first] - self.time, dt[first])
+            parts.append(rest)
+        return tuple(np.concatenate(pair) for pair in zip(*parts))
+
+    def _break_before(self, x: float, dt: float, offset: float, factor: float) -> float | None:
+        """Let the muscle break if it has not; return the angle [rad] of the arm if it had held."""
+        if self._present is self._broken:
+            return None
         self._broken.take_over(self._intact)
-        x, dt, offset, factor = columns[:, first].tolist()
-        before = self._intact.step(x, dt, offset, factor)
-        tail = self._broken.proceed(*columns[:, first:])
-        tail[0][0] = _on_its_way(before, tail[0][0], clock[first] - self.time, dt)
-        return rest, *(np.concatenate(pair) for pair in zip(head, tail))
+        self._present = self._broken
+        return self._intact.step(x, dt, offset, factor)
 
 
 def _on_its_way(before: float, after: float, since: float, dt: float) -> float:

@@ -17,6 +17,9 @@ from hysteresis_ros.operators import HysteresisOperator
 
 # A residual elongation is found to this [m], in so many trials at most.
 TOLERANCE, MOST_TRIALS = 1e-9, 60
+# An arm that has not yielded in so many rows is taken not to in this many times as many, until its
+# load is looked at.
+FURTHER = 4
 
 
 class YieldingBalance:
@@ -75,18 +78,18 @@ class YieldingBalance:
 
     def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
         """Wipe the memory, take up the state of rest under `x` at `clock` [s]; see `ArmBalance`."""
-        return self._yield(lambda more: self._arm.settle(x, clock, offset + more))
+        return self._yield(lambda more: self._arm.settle(x, clock, offset + more), clock)
 
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
              clock: float = 0.0) -> float:
         """Advance to the next sample, at `clock` [s]; see `ArmBalance`."""
-        return self._yield(lambda more: self._arm.step(x, dt, offset + more, factor, clock))
+        return self._yield(lambda more: self._arm.step(x, dt, offset + more, factor, clock), clock)
 
-    def _yield(self, advance: Callable[[float], float]) -> float:
+    def _yield(self, advance: Callable[[float], float], clock: float) -> float:
         """Return the angle of `advance(residual)`, with the residual that its load leaves."""
         state = self._arm.snapshot()
         angle = advance(self._residual)
-        low, above = self._residual, self._left_by(angle) - self._residual
+        low, above = self._residual, self._left_by(angle, clock) - self._residual
         high, below = math.inf, 0.0
         # The longer the muscles, the less they yield.
         for trial in range(MOST_TRIALS if above > TOLERANCE else 0):
@@ -98,7 +101,7 @@ class YieldingBalance:
                 self._residual = 0.5 * (low + high)
             self._arm.rewind(state)
             angle = advance(self._residual)
-            error = self._left_by(angle) - self._residual
+            error = self._left_by(angle, clock) - self._residual
             if abs(error) <= TOLERANCE:
                 break
             if error > 0.0:
@@ -107,9 +110,9 @@ class YieldingBalance:
                 high, below = self._residual, error
         return angle
 
-    def _left_by(self, angle: float) -> float:
-        """Return the residual elongation [m] that the load at an angle [rad] leaves."""
-        return self._compliance * max(self._arm.load(angle) - self._load, 0.0)
+    def _left_by(self, angle: Any, clock: Any) -> Any:
+        """Return the residual elongation [m] that the load at each angle [rad] leaves."""
+        return self._compliance * np.maximum(self._arm.load(angle, clock) - self._load, 0.0)
 
     def run(self, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
             factor: np.ndarray, clock: np.ndarray
@@ -119,8 +122,42 @@ class YieldingBalance:
         rests, found, begin = [], np.empty((3, len(x))), 0
         columns = np.array([x, dt, offset, factor, clock])
         for end in np.asarray(ends).tolist():
+            own = slice(begin, end)
             rests.append(self.settle(cold, float(clock[begin] - dt[begin])))
-            for row, values in enumerate(columns[:, begin:end].T.tolist(), begin):
-                found[:, row] = self.step(*values), self.output, self.operators[0].input
+            found[:, own] = self._trial(columns[:, own])
             begin = end
         return np.array(rests), *found
+
+    def _trial(self, columns: np.ndarray) -> np.ndarray:
+        """Return angles, outputs and inputs (3, rows) of a trial; arguments of `step` in rows."""
+        rows = columns.shape[1]
+        found, begin, ahead = np.empty((3, rows)), 0, rows
+        while begin < rows:
+            held = 0
+            if ahead > 1:
+                held = self._hold(columns[:, begin:begin + ahead], found[:, begin:begin + ahead])
+                begin += held
+            if held == ahead or begin == rows:
+                ahead *= FURTHER
+                continue
+            before = self._residual
+            found[:, begin] = (self.step(*columns[:, begin].tolist()), self.output,
+                               self.operators[0].input)
+            begin += 1
+            # While the load grows it yields row after row.
+            ahead = 1 if self._residual > before else FURTHER
+        return found
+
+    def _hold(self, columns: np.ndarray, found: np.ndarray) -> int:
+        """Fill `found` (3, rows) as far as nothing yields, go there, and return how far."""
+        state, (x, dt, offset, *others) = self._arm.snapshot(), columns
+        found[:] = self._arm.proceed(x, dt, offset + self._residual, *others)
+        above = self._left_by(found[0], others[-1]) - self._residual > TOLERANCE
+        if not above.any():
+            return len(x)
+        held = int(np.argmax(above))
+        self._arm.rewind(state)
+        if held:
+            self._arm.proceed(x[:held], dt[:held], offset[:held] + self._residual,
+                              *(column[:held] for column in others))
+        return held
