@@ -102,7 +102,8 @@ class Covariance:
     clock : ndarray, shape (n,)
         Time of each row [s].
     trial : ndarray of int, shape (n,)
-        Trial of each row; rows of different trials share the discrepancy only.
+        Trial of each row, whose rows lie side by side; those of different trials share the
+        discrepancy only.
     resolution : float
         Standard deviation that the sensor's steps cause; the noise is at least this.
     largest_noise : float
@@ -121,11 +122,12 @@ class Covariance:
     def __init__(self, discrepancy: Discrepancy, clock: np.ndarray, trial: np.ndarray,
                  resolution: float, largest_noise: float, scale_spread: float) -> None:
         self._discrepancy = discrepancy
-        self._same = trial[:, None] == trial[None, :]
-        self._gaps = np.where(self._same, np.abs(clock[:, None] - clock[None, :]), 0.0)
+        edges = [0, *(np.flatnonzero(np.diff(trial)) + 1).tolist(), len(trial)]
+        self._trials = [slice(*pair) for pair in zip(edges, edges[1:])]
+        self._gaps = [np.abs(clock[own, None] - clock[own]) for own in self._trials]
         self._spread = scale_spread
         self.size = discrepancy.size
-        span = max(float(np.max(self._gaps)), _TINY)
+        span = max(*(float(np.max(gaps)) for gaps in self._gaps), _TINY)
         steps = np.diff(clock)[np.diff(trial) == 0]
         shortest = max(float(np.median(steps)), 1e-9 * span) if len(steps) else span
         self.resolution = max(resolution, 1e-4 * self.size, _TINY)
@@ -149,12 +151,17 @@ class Covariance:
         return np.clip([0.0, np.log(max(drift * self._scale, _TINY)), self._middle,
                         np.log(max(noise * self._scale, self.resolution))], self._low, self._high)
 
-    def _parts(self, values: np.ndarray, discrepancy: np.ndarray
-               ) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return discrepancy and drift, each (n, n), and the variance of the noise."""
-        drift = np.where(self._same, np.exp(-self._gaps / np.exp(values[2])), 0.0)
-        drift *= np.exp(2.0 * values[1])
-        return np.exp(2.0 * values[0]) * discrepancy, drift, np.exp(2.0 * values[3])
+    def _parts(self, values: np.ndarray, matrix: np.ndarray
+               ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+        """Return discrepancy (n, n), drift of each trial (m, m), and the covariance (n, n)."""
+        discrepancy = np.exp(2.0 * values[0]) * matrix
+        drift, total = [], discrepancy.copy()
+        for own, gaps in zip(self._trials, self._gaps):
+            block = np.exp(2.0 * values[1]) * np.exp(-gaps / np.exp(values[2]))
+            total[own, own] += block
+            drift.append(block)
+        total.flat[::len(total) + 1] += np.exp(2.0 * values[3])
+        return discrepancy, drift, total
 
     def _prior(self, values: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the log density of values (4,), and its gradient."""
@@ -183,9 +190,7 @@ class Covariance:
         """Iterate over the covariances for several values (4,); see `point`."""
         matrix = self._discrepancy.matrix()
         for values in several:
-            discrepancy, drift, white = self._parts(values, matrix)
-            total = discrepancy + drift
-            total.flat[::len(total) + 1] += white
+            total = self._parts(values, matrix)[2]
             factor = linalg.cholesky(total, lower=True, check_finite=False)
             constant = (self._prior(values)[0] - float(np.sum(np.log(np.diag(factor))))
                         - 0.5 * len(total) * np.log(2.0 * np.pi))
@@ -193,7 +198,7 @@ class Covariance:
 
     def white(self, size: float) -> Point:
         """Return the covariance of white noise of a size alone: a fit is one by least squares."""
-        count = len(self._gaps)
+        count = self._trials[-1].stop
         values = np.array([self._low[0], self._low[1], self._middle, np.log(size)])
         return Point(values, size * np.eye(count), -np.inf)
 
@@ -258,9 +263,7 @@ class Covariance:
     def _cost(self, values: np.ndarray, residual: np.ndarray, matrix: np.ndarray
               ) -> tuple[float, np.ndarray]:
         """Return minus the log posterior density of values (4,), and its gradient."""
-        discrepancy, drift, white = self._parts(values, matrix)
-        total = discrepancy + drift
-        total.flat[::len(total) + 1] += white
+        discrepancy, drift, total = self._parts(values, matrix)
         try:
             factor = linalg.cho_factor(total, lower=True, check_finite=False)
         except linalg.LinAlgError:
@@ -272,13 +275,14 @@ class Covariance:
         inverse = np.tril(inverse, -1)
         prior, slope = self._prior(values)
 
-        def trace(part: np.ndarray) -> float:
-            inside = 2.0 * np.sum(inverse * part) + diagonal @ np.diag(part)
-            return 0.5 * (inside - solved @ part @ solved)
+        def trace(part: np.ndarray, own: slice = slice(None)) -> float:
+            inside = 2.0 * np.sum(inverse[own, own] * part) + diagonal[own] @ np.diag(part)
+            return 0.5 * (inside - solved[own] @ part @ solved[own])
 
+        blocks = list(zip(self._trials, drift, self._gaps))
         gradient = np.array([
-            2.0 * trace(discrepancy), 2.0 * trace(drift),
-            trace(drift * self._gaps) / np.exp(values[2]),
-            white * (np.sum(diagonal) - solved @ solved)])
+            2.0 * trace(discrepancy), 2.0 * sum(trace(part, own) for own, part, _ in blocks),
+            sum(trace(part * gaps, own) for own, part, gaps in blocks) / np.exp(values[2]),
+            np.exp(2.0 * values[3]) * (np.sum(diagonal) - solved @ solved)])
         cost = (0.5 * residual @ solved + float(np.sum(np.log(np.diag(factor[0])))) - prior)
         return float(cost), gradient - slope
