@@ -97,7 +97,7 @@ class BenchSelection:
         grown = self._grown()
         self.tried = self._in_parallel(_judged, self.fitter, [fit.effects for fit in grown])
         self.alone = sorted((fit for fit in self.tried if len(fit.effects) == 1), key=self.error)
-        values = self._significance(self.tried)
+        values = self._significance(self.tried, self.base)
         self.p_values = {fit.names: float(value) for fit, value in zip(self.tried, values)}
         self.sets = [fit for fit, value in zip(self.tried, values)
                      if not fit.implausible() and value <= SIGNIFICANCE and self._helps(fit)]
@@ -108,7 +108,8 @@ class BenchSelection:
                      if self.error(fit) <= (1.0 + self.settings.practical) * best]
         self.found = min(near_best, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.error(fit)))
-        self._keep_stable()
+        while self._leave_out_chance() or self._leave_out_unstable():
+            pass
         self._keep_determined()
 
     def _grown(self) -> list[Fit]:
@@ -156,21 +157,46 @@ class BenchSelection:
     def _fitted_error(self, fit: Fit) -> float:
         return self._search.error(fit.predicted)
 
-    def _keep_stable(self) -> None:
+    def _leave_out_chance(self) -> bool:
         """
-        Leave out, one after the other, effects that are not named again without some load.
+        Leave out an effect that explains, beside the others, no more than one would by chance.
+
+        It was the best of all that could have been added to the others, which are tested together.
+        What every loaded muscle has needs no such proof.
+        """
+        for effect in self.found.effects:
+            others = frozenset(self.found.names) - {effect.id}
+            smaller = next((fit for fit in [self.base, *self.tried]
+                            if frozenset(fit.names) == others), None)
+            # Without what takes the first stage's place the rest may not have been tried.
+            if effect.universal or smaller is None:
+                continue
+            added = [self.found, *(fit for fit in self.tried if fit is not self.found and (
+                len(fit.names) == len(self.found.names) and others < frozenset(fit.names)))]
+            value = self._significance(added, smaller)[0]
+            if value > SIGNIFICANCE:
+                self._leave_out(effect.id, 'beside the others it explains no more than chance '
+                                f'(p = {value:.2f})', smaller)
+                return True
+        return False
+
+    def _leave_out_unstable(self) -> bool:
+        """
+        Leave out the effect that is named again on the fewest loads, if that is not on most.
 
         With a load left out, an effect is named again if the best set with it predicts that load
         better than the best set without it, where both were fitted to the other loads.
         """
-        while self.found.effects:
-            without = {name: self._best_without(name) for name in self.found.names}
-            share = {name: self._named_again(other) for name, other in without.items()}
-            name = min(share, key=lambda one: share[one])
-            if share[name] > NAMED_AGAIN:
-                return
-            self._leave_out(name, f'with one load left out it is named again on '
-                            f'{100.0 * share[name]:.0f} % of them', without[name])
+        if not self.found.effects:
+            return False
+        without = {name: self._best_without(name) for name in self.found.names}
+        share = {name: self._named_again(other) for name, other in without.items()}
+        name = min(share, key=lambda one: share[one])
+        if share[name] > NAMED_AGAIN:
+            return False
+        self._leave_out(name, f'with one load left out it is named again on '
+                        f'{100.0 * share[name]:.0f} % of them', without[name])
+        return True
 
     def _keep_determined(self) -> None:
         """Leave out effects whose size the rows do not determine, but for what is usual."""
@@ -186,9 +212,9 @@ class BenchSelection:
         self.found = instead
 
     def _best_without(self, name: str) -> Fit:
-        """Return the best set that lacks an effect."""
-        return min((fit for fit in [self.base, *self.sets] if name not in fit.names),
-                   key=self.error)
+        """Return the best set that lacks an effect, and those that were left out before."""
+        return min((fit for fit in [self.base, *self.sets]
+                    if not {name, *self.unstable}.intersection(fit.names)), key=self.error)
 
     def _named_again(self, other: Fit) -> float:
         """Return the share of folds that the set found predicts better than another one."""
@@ -206,9 +232,9 @@ class BenchSelection:
         """Return the held-out RMSE of a fit, in the unit of the response."""
         return self.fitter.error(fit.held_out)
 
-    def _gains(self, fit: Fit) -> np.ndarray:
+    def _gains(self, fit: Fit, base: Fit) -> np.ndarray:
         """
-        Return the reduction of the squared error in each block, over the error there.
+        Return the reduction of a base's squared error in each block, over the error there.
 
         Of fitted rows: a load that is held out has its errors in few places, so that blocks say
         little of chance. The shares are from -1 to 1, or the worst block would decide alone; and
@@ -216,20 +242,21 @@ class BenchSelection:
         """
         before, after = (significance.block_sums(
             (self.problem.measured - one.predicted) ** 2, self.problem.block)
-            for one in (self.base, fit))
+            for one in (base, fit))
         small = max(self.problem.noise, SMALL_ERROR * float(np.ptp(self.problem.measured)))
         return (before - after) / (
             before + after + small ** 2 * np.bincount(self.problem.block))
 
-    def _significance(self, fits: Sequence[Fit]) -> np.ndarray:
+    def _significance(self, fits: Sequence[Fit], base: Fit) -> np.ndarray:
+        """Return family-wise p values of what fits explain beyond a base."""
         if not fits:
             return np.zeros(0)
         return significance.paired_p_values(
-            np.stack([self._gains(fit) for fit in fits]), self._rng, self.settings.draws)
+            np.stack([self._gains(fit, base) for fit in fits]), self._rng, self.settings.draws)
 
     def _helps(self, fit: Fit) -> bool:
         """Whether a fit explains enough of held-out rows to matter, and helps in most blocks."""
-        gains = self._gains(fit)
+        gains = self._gains(fit, self.base)
         return bool(self.error(fit) <= (1.0 - self.settings.practical) * self.error(self.base)
                     and np.sum(gains[gains > 0.0]) >= CONSISTENT * np.sum(np.abs(gains)))
 
