@@ -246,6 +246,16 @@ def test_loops_that_the_load_widens_are_part_of_both_models(g):
     assert np.abs(load_history(problem, [slopes]).path).max() == pytest.approx(plain, rel=0.3)
 
 
+def test_cold_ends_are_part_of_both_models():
+    """Else the difference would be that of warm ends, six times as large."""
+    model = bicep_model()
+    ends = effect_of(model, 'cold_clamps', share=0.3)
+    both_ways = arm_run(np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)]))
+    plain = np.abs(path_of(model, both_ways)).max()
+    problem = problem_for(model.with_effects([ends]), [both_ways])
+    assert np.abs(load_history(problem, [ends]).path).max() == pytest.approx(plain, rel=0.3)
+
+
 def test_where_the_strain_does_not_grow_with_the_load_nothing_is_kept():
     """Nor where the load holds still: the bench shows all that there is."""
     model = bicep_model()

@@ -17,8 +17,8 @@ import pytest
 HISTORY = st.lists(st.tuples(st.floats(0.0, 150.0), st.floats(0.0, 22.0)), max_size=12)
 # Effects that are constants of the grains and that other equations do not have.
 REFUSED = {'grains': set(),
-           'brinson': {'stress_dependent_strain', 'r_phase', 'formation_memory'},
-           'lagoudas': {'r_phase', 'formation_memory'}}
+           'brinson': {'stress_dependent_strain', 'r_phase', 'formation_memory', 'cold_clamps'},
+           'lagoudas': {'r_phase', 'formation_memory', 'cold_clamps'}}
 
 
 def load(wire, temperature, stresses):

@@ -23,5 +23,5 @@ def arm_of(model) -> ArmBalance:
         With a geometry and a Preisach operator as its length stage.
     """
     chain = model.chain()
-    return ArmBalance(Preisach(model.require_length_stage()), model.require_geometry(), chain,
+    return ArmBalance(Preisach(model.require_length_stage(chain)), model.require_geometry(), chain,
                       model.first_stage(chain).loaded)

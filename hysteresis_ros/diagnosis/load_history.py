@@ -84,7 +84,7 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
     """Give both differences in the rows that are judged, trial by trial."""
     model = problem.model
     chain = Chain(effects, model.surroundings)
-    first, stage = model.first_stage(chain), model.require_length_stage()
+    first, stage = model.first_stage(chain), model.require_length_stage(chain)
     arm = _Statics(model, chain)
     for simulator, rows in zip(problem.simulators, problem.chosen):
         angle = simulator.run(effects)

@@ -126,7 +126,7 @@ class Surroundings(NamedTuple):
     the width of the range seen, and `sign` is -1 for a muscle that gets shorter when driven, 1 for
     one that gets longer. `rest_load` is the load under which the cold muscle has its resting
     length, and `least` the response of H2 where it has transformed altogether. `muscles` is the
-    number of parallel muscles that lift the arm, 1 without an arm.
+    number of parallel muscles that lift the arm, 1 without an arm. `operator` is the kind of H2.
     """
 
     length: float
@@ -142,6 +142,7 @@ class Surroundings(NamedTuple):
     rest_load: float = 0.0
     least: float = 0.0
     muscles: int = 1
+    operator: str = 'preisach'
 
 
 class Effect(abc.ABC):

@@ -84,6 +84,9 @@ class MaterialEffect(Effect):
     keeps_strain: float = 0.0
     # Excess length [m] of each parallel muscle.
     offsets: tuple[float, ...] = (0.0,)
+    # Parts of the wire that are not equally warm, and the excess of each over that of the wire on
+    # the bench, each shape (K,); None: all of it is as warm as that.
+    places: tuple[np.ndarray, np.ndarray] | None = None
 
     def yields(self, surroundings: Surroundings) -> tuple[float, float]:
         """Return the load [N] from which a muscle yields for good, and by how much then [m/N]."""

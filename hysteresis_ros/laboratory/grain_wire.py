@@ -19,9 +19,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from hysteresis_ros.laboratory.grains import GrainDistribution, Grains
+from hysteresis_ros.laboratory.clamps import excess
+from hysteresis_ros.laboratory.grains import Felt, GrainDistribution, Grains
+from hysteresis_ros.laboratory.heat import ROOM
 from hysteresis_ros.laboratory.variation import vary
 from hysteresis_ros.laboratory.wire import Material, Wire
+
+# Grains of a wire whose places differ: four times as many move an arm by one count of its encoder.
+# A low-discrepancy sequence, other than that of the loops, spreads them over half the wire.
+GRAINS_WITH_PLACES = 3000
+SILVER = math.sqrt(2.0) - 1.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,6 +67,9 @@ class GrainMaterial(Material):
     kept_strain : float
         Share of the strain that grains keep from the stress under which they turned to martensite,
         until they turn back; 0: none.
+    cold_ends : float
+        Length over which the wire's two ends warm up, over its length: see `clamps`; 0: all of it
+        is equally warm.
     """
 
     name: ClassVar[str] = 'grains'
@@ -83,6 +93,7 @@ class GrainMaterial(Material):
     early_spread: float = 6.0
     early_clausius_clapeyron: float = 16e6
     kept_strain: float = 0.0
+    cold_ends: float = 0.0
 
     @property
     def temperature_step(self) -> float:    # type: ignore[override]
@@ -129,6 +140,10 @@ class GrainMaterial(Material):
         """Return the same with grains that keep a share of the strain they formed with."""
         return dataclasses.replace(self, kept_strain=share)
 
+    def with_cold_ends(self, share: float) -> 'GrainMaterial':
+        """Return the same with clamps that keep the wire's ends cold, and grains enough."""
+        return dataclasses.replace(self, cold_ends=share, grain_count=GRAINS_WITH_PLACES)
+
     def transformation_strain(self, stress: float) -> float:
         """Return H(sigma) for a stress [Pa]."""
         return self.strain_without_load + (self.largest_strain - self.strain_without_load) * (
@@ -173,6 +188,9 @@ class GrainWire(Wire):
             material.grain_count, material.grain_offset)
         self._shift = 1.0 / material.clausius_clapeyron
         self._cooling_shift = self._shift / material.cooling_ratio
+        # Every grain has its place, whatever its temperatures are.
+        place = (material.grain_offset + SILVER * np.arange(material.grain_count)) % 1.0
+        self._excess = excess(place, material.cold_ends)
         self._early_shift = 1.0 / material.early_clausius_clapeyron
         super().__init__(material)
 
@@ -184,7 +202,8 @@ class GrainWire(Wire):
         self._formed = material.strain_without_load
         self._early = None
         if material.early_strain > 0.0:
-            middle = material.early_temperature + material.early_spread * np.linspace(-1.0, 1.0, 40)
+            middle = material.early_temperature + material.early_spread * np.linspace(
+                -1.0, 1.0, len(self._excess) if material.cold_ends > 0.0 else 40)
             self._early = Grains(middle, middle - material.early_loop)
         tension = material.pretension if tension is None else tension
         hot = float(self._heating.max()) + self._shift * tension / self._section + 20.0
@@ -201,8 +220,15 @@ class GrainWire(Wire):
         return self._peek(temperature, tension / self._section)
 
     def _peek(self, temperature: float, stress: float) -> float:
-        return self._grains.peek(temperature - self._shift * stress,
-                                 temperature - self._cooling_shift * stress)
+        local = self._local(temperature)
+        return self._grains.peek(local - self._shift * stress,
+                                 local - self._cooling_shift * stress)
+
+    def _local(self, temperature: float) -> Felt:
+        """Return the temperature of each grain where the clamps leave the wire at one [degC]."""
+        if self.material.cold_ends == 0.0:
+            return temperature
+        return ROOM + self._excess * (temperature - ROOM)
 
     def _resting_strain(self) -> float:
         return self.material.strain(1.0, 1.0, self.material.pretension / self._section)
@@ -210,7 +236,7 @@ class GrainWire(Wire):
     def _peek_strain(self, temperature: float, stress: float) -> float:
         early = 1.0
         if self._early is not None:
-            felt = temperature - self._early_shift * stress
+            felt = self._local(temperature) - self._early_shift * stress
             early = self._early.peek(felt, felt)
         formed = self._formed_at(temperature, stress) if self._keeps else 0.0
         return self._strain(self._peek(temperature, stress), early, stress, formed)
@@ -226,9 +252,9 @@ class GrainWire(Wire):
         Grains hold each other: one that turns to martensite brings the strain of that moment in,
         and one that turns back takes the mean of all out.
         """
-        before = self._grains.martensite
-        change = self._grains.turned(temperature - self._shift * stress,
-                                     temperature - self._cooling_shift * stress) - before
+        before, local = self._grains.martensite, self._local(temperature)
+        change = self._grains.turned(local - self._shift * stress,
+                                     local - self._cooling_shift * stress) - before
         mean = self._formed / max(float(before.mean()), 1e-12)
         strain = self.material.transformation_strain(stress)
         return self._formed + (strain * float(np.maximum(change, 0.0).mean())
@@ -237,11 +263,12 @@ class GrainWire(Wire):
     def _commit_strain(self, temperature: float, stress: float) -> float:
         if self._keeps:
             self._formed = self._formed_at(temperature, stress)
-        self._martensite = self._grains.commit(temperature - self._shift * stress,
-                                               temperature - self._cooling_shift * stress)
+        local = self._local(temperature)
+        self._martensite = self._grains.commit(local - self._shift * stress,
+                                               local - self._cooling_shift * stress)
         early = 1.0
         if self._early is not None:
-            felt = temperature - self._early_shift * stress
+            felt = self._local(temperature) - self._early_shift * stress
             early = self._early.commit(felt, felt)
         return self._strain(self._martensite, early, stress, self._formed)
 

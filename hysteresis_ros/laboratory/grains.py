@@ -12,6 +12,7 @@ equilibrium with a spring or an arm can be solved for.
 
 import dataclasses
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,6 +21,9 @@ SMEAR = 2.5
 # Share of the grains that make up the foot of the distribution.
 FOOT_SHARE = 0.05
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+# A temperature of all grains, or one of each, shape (count,).
+Felt: TypeAlias = float | np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +98,7 @@ class Grains:
         self._next = np.ones(len(heating))
         self._work = np.ones(len(heating))
 
-    def _turn(self, heating: float, cooling: float) -> np.ndarray:
+    def _turn(self, heating: Felt, cooling: Felt) -> np.ndarray:
         # Martensite may not exceed what heating leaves, nor fall below what cooling has formed.
         result = np.subtract(self._lower, cooling / SMEAR, out=self._next)
         np.maximum(result, self._share, out=result)
@@ -102,18 +106,18 @@ class Grains:
         np.maximum(result, 0.0, out=result)
         return np.minimum(result, 1.0, out=result)
 
-    def peek(self, heating: float, cooling: float) -> float:
+    def peek(self, heating: Felt, cooling: Felt) -> float:
         """
         Return the martensite share that the grains would have; their state stays.
 
         Parameters
         ----------
-        heating, cooling : float
+        heating, cooling : float or ndarray, shape (count,)
             Temperature felt by the turn to austenite and by the turn back [degC].
         """
         return float(self._turn(heating, cooling).sum()) / len(self._share)
 
-    def commit(self, heating: float, cooling: float) -> float:
+    def commit(self, heating: Felt, cooling: Felt) -> float:
         """Bring the grains to the felt temperatures [degC] and return the martensite share."""
         share = float(self._turn(heating, cooling).sum()) / len(self._share)
         self._share, self._next = self._next, self._share
@@ -124,6 +128,6 @@ class Grains:
         """Martensite share of each grain, shape (count,)."""
         return self._share.copy()
 
-    def turned(self, heating: float, cooling: float) -> np.ndarray:
+    def turned(self, heating: Felt, cooling: Felt) -> np.ndarray:
         """Return the share that each grain would have, shape (count,); their state stays."""
         return self._turn(heating, cooling).copy()

@@ -148,6 +148,11 @@ def _formation_memory(conditions: Conditions, size: float, specimen: np.random.G
     conditions.material = conditions.material.with_kept_strain(min(0.85 * size, 1.0))
 
 
+def _cold_clamps(conditions: Conditions, size: float, specimen: np.random.Generator,
+                 recording: np.random.Generator) -> None:
+    conditions.material = conditions.material.with_cold_ends(0.15 * size)
+
+
 def _creep(conditions: Conditions, size: float, specimen: np.random.Generator,
            recording: np.random.Generator) -> None:
     conditions.creep = 0.004 * size
@@ -330,6 +335,8 @@ LATER = {
                        _overload),
     'formation_memory': Effect('Martensite keeps the strain of the load under which it formed.',
                                _formation_memory, bench=True),
+    'cold_clamps': Effect("Heavy clamps keep the ends of the arm's wires cold; the bench has long "
+                          'wires.', _cold_clamps),
 }
 
 # Here stood a torn wire while no catalogue had it.

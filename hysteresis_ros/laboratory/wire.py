@@ -87,6 +87,10 @@ class Material(abc.ABC):
         """Return the same with martensite that keeps a share of the strain it formed with."""
         raise self._lacks('formation_memory')
 
+    def with_cold_ends(self, share: float) -> 'Material':
+        """Return the same with clamps that keep the ends cold over a share of the length."""
+        raise self._lacks('cold_clamps')
+
     def _lacks(self, effect: str) -> ParameterError:
         return ParameterError(f'laboratory: a {self.name} muscle cannot have {effect}: its '
                               'constitutive equations have no such constant; choose another '

@@ -84,6 +84,11 @@ class Chain:
         return next((e.offsets for e in self.material if len(e.offsets) > 1), (0.0,))
 
     @property
+    def places(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Parts of the wire and their excess temperature, each shape (K,); None: all alike."""
+        return next((e.places for e in self.material if e.places is not None), None)
+
+    @property
     def moves(self) -> bool:
         """Whether the arm's own velocity or acceleration counts."""
         return any(effect.moves for effect in self.mechanism)

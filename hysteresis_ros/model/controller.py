@@ -132,7 +132,7 @@ class Controller:
         self._first = model.first_stage(self._chain)
         self._force = copy.deepcopy(model.force_stage)
         if model.length_stage is not None:
-            self._second = SecondStage(model.require_length_stage(), model.sign,
+            self._second = SecondStage(model.require_length_stage(self._chain), model.sign,
                                        self._chain, self._first.loaded)
         self._pacing = Pacing(
             [self._chain, *_with_other_lags(model, self._chain, lag_margin)], self._clip,

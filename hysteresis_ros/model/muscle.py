@@ -24,6 +24,7 @@ from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.linear import LinearModel
+from hysteresis_ros.model.places import stage_of_places
 from hysteresis_ros.operators import HysteresisOperator
 
 if TYPE_CHECKING:
@@ -115,7 +116,8 @@ class MuscleModel:
         return Surroundings(length, self.mean_load, float(bare.to_drive_squared(largest)), span,
                             self.drive, self.load_name, self.response, self.cold_drive,
                             self.drive_range, self.sign, rest_load, least,
-                            int(self.geometry.muscle_count) if self.geometry else 1)
+                            int(self.geometry.muscle_count) if self.geometry else 1,
+                            self.length_stage.kind if self.length_stage is not None else '')
 
     def with_effects(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return a copy with other effects and the same operators."""
@@ -207,7 +209,7 @@ class MuscleModel:
         ModelFileError
             If the model has no length stage.
         """
-        geometry, stage = self.require_geometry(), self.require_length_stage()
+        geometry, stage = self.require_geometry(), self.require_length_stage(chain)
         loaded = self.first_stage(chain).loaded
         if self.sign > 0:
             raise ParameterError('the model is of a muscle that extends when driven; the bicep '
@@ -250,11 +252,25 @@ class MuscleModel:
                 'the model has no arm geometry; identify it with --geometry geometry.yaml')
         return self.geometry
 
-    def require_length_stage(self) -> HysteresisOperator:
-        """Return a copy of H2 with its memory wiped; ModelFileError if the model has none."""
+    def require_length_stage(self, chain: Chain | None = None) -> HysteresisOperator:
+        """
+        Return a copy of H2 with its memory wiped.
+
+        Parameters
+        ----------
+        chain : Chain, optional
+            Effects of the model, some of which make another operator of it; see `places`.
+
+        Raises
+        ------
+        ModelFileError
+            If the model has none.
+        ParameterError
+            If it has one of which they cannot.
+        """
         operator = copy.deepcopy(self._length_stage())
         operator.reset()
-        return operator
+        return operator if chain is None else stage_of_places(self, chain, operator)
 
     def require_length_range(self) -> tuple[float, float]:
         """Return what H2 can give; ModelFileError if the model has none."""

@@ -308,7 +308,7 @@ class Simulator:
             balance = self._balance(chain)
             asked = None if exact or chain.moves else self._asked
             return lambda trials: self._angles(chain, first, balance, asked, trials)
-        stage = self.model.require_length_stage()
+        stage = self.model.require_length_stage(chain)
         return lambda trials: [self._length(chain, first, stage, trial) for trial in trials]
 
     def _balance(self, chain: Chain) -> Lifting:
