@@ -132,9 +132,9 @@ def test_a_gain_that_chance_could_give_is_no_answer(monkeypatch):
         assert found_in(table(lagging)).missing == missing
 
 
-@pytest.mark.parametrize('share, missing', [(0.99, ['valve_lag']), (1.0, [])])
+@pytest.mark.parametrize('share, missing', [(1.0, ['valve_lag']), (1.01, [])])
 def test_what_too_few_trials_name_again_cannot_be_determined(monkeypatch, share, missing):
-    """All four do here, which is not more than all."""
+    """All four do here."""
     monkeypatch.setattr(bench_selection, 'NAMED_AGAIN', share)
     found = found_in(table(lagging))
     assert found.missing == missing
@@ -142,17 +142,36 @@ def test_what_too_few_trials_name_again_cannot_be_determined(monkeypatch, share,
     assert ('cannot be determined here: with one load left out' in reason) != bool(missing)
 
 
-@pytest.mark.parametrize('practical, missing', [
-    (0.2, {'valve_lag', 'creep'}), (0.4, {'valve_lag'})])
-def test_an_effect_more_has_to_matter(practical, missing):
-    """The second takes a fifth off the error here: less than what is asked for counts as none."""
+def lagging_and_creeping(**settings):
+    """Return the diagnosis of a muscle that lags, most of it, and creeps."""
     measurement = table(lambda drive: lagging(drive) + 0.3 * creeping(drive))
     model = identify(measurement, operator='preisach', levels=(12, 12)).model
-    found = diagnose(model, [measurement], ('valve_lag', 'creep'), seed=1,
-                     settings=dataclasses.replace(Settings(), practical=practical))
+    return diagnose(model, [measurement], ('valve_lag', 'creep'), seed=1,
+                    settings=dataclasses.replace(Settings(), **settings))
+
+
+@pytest.mark.parametrize('practical, missing', [
+    (0.1, {'valve_lag', 'creep'}), (0.4, {'valve_lag'})])
+def test_an_effect_more_has_to_matter(practical, missing):
+    """Less than what is asked for off the error counts as none."""
+    found = lagging_and_creeping(practical=practical)
     assert set(found.missing) == missing
     likely = {frozenset(one['effects']): one['probability'] for one in found.sets}
     assert likely[frozenset({'valve_lag', 'creep'})] > likely[frozenset({'valve_lag'})] > 0.0
+
+
+@pytest.mark.parametrize('p_value, missing', [
+    (0.04, ['creep', 'valve_lag']), (0.06, ['valve_lag'])])
+def test_an_effect_more_has_to_explain_more_than_chance_beside_the_first(
+        monkeypatch, p_value, missing):
+    """Where all sets are tested together, or the only other one, each of them does."""
+    monkeypatch.setattr(
+        significance, 'paired_p_values',
+        lambda gains, *rest: np.full(len(gains), 0.01 if len(gains) > 1 else p_value))
+    found = lagging_and_creeping()
+    assert sorted(found.missing) == missing
+    assert ('than chance (p = 0.06)' in found.not_excited.get('creep', '')) == (
+        'creep' not in missing)
 
 
 def test_creep_of_a_polymer_shows_and_is_plausible():

@@ -13,15 +13,16 @@ from hysteresis_ros.measurements.table import Measurement
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed, wording', [(6302, 'than chance'), (6311, 'named again on 50 %')])
-def test_wear_that_is_not_there_is_not_named_beside_what_the_load_does(seed, wording):
+@pytest.mark.parametrize('muscle, seed', [
+    ('lagoudas', 6302), ('lagoudas', 6311), ('brinson', 6353), ('brinson', 6344)])
+def test_what_the_load_does_is_named_on_every_specimen_and_no_wear(muscle, seed):
     """
-    It takes a twentieth off the error of lengths that were held out, on one of four loads.
+    Wear that is not there takes a twentieth off the error of one of four loads held out.
 
-    On the second specimen each of wear and the wire's elasticity is better on two loads, so that
-    the set without the one had the other, and the set without that one the first, without an end.
+    Of the third and fourth specimen what is named predicts two or three of four loads much better,
+    and the least, which lies beyond the others, worse.
     """
-    tables = bench_tables({}, seed, 'lagoudas')
+    tables = bench_tables({}, seed, muscle)
     force, length = (Measurement.from_columns(tables[f'{name}.csv'])
                      for name in ('force', 'length'))
     model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY),
@@ -29,4 +30,3 @@ def test_wear_that_is_not_there_is_not_named_beside_what_the_load_does(seed, wor
     found = diagnose(model, [length.select(range(4))], seed=0)
     assert {'stress_dependence', 'stress_dependent_strain', 'transformation_slopes'} == {
         *found.missing} - {'series_compliance'}
-    assert any(wording in reason for reason in found.not_excited.values())

@@ -40,7 +40,7 @@ SMALL_ERROR = 0.01
 GROWN = 3
 # Share by which an effect has to lower the error of the rows that its set is fitted to.
 WORTH_JUDGING = 0.01
-# Share of the loads on which an effect has to be named again with that load left out.
+# Share of the loads on which an effect has to be named again, at least, with that load left out.
 NAMED_AGAIN = 0.5
 
 
@@ -103,11 +103,11 @@ class BenchSelection:
                      if not fit.implausible() and value <= SIGNIFICANCE and self._helps(fit)]
         if not self.sets:
             return
-        best = min(map(self.error, self.sets))
+        best = min(map(self.typical_error, self.sets))
         near_best = [fit for fit in self.sets
-                     if self.error(fit) <= (1.0 + self.settings.practical) * best]
+                     if self.typical_error(fit) <= (1.0 + self.settings.practical) * best]
         self.found = min(near_best, key=lambda fit: (
-            len(fit.effects), len(fit.vector), self.error(fit)))
+            len(fit.effects), len(fit.vector), self.typical_error(fit)))
         while self._leave_out_chance() or self._leave_out_unstable():
             pass
         self._keep_determined()
@@ -164,6 +164,7 @@ class BenchSelection:
         It was the best of all that could have been added to the others, which are tested together.
         What every loaded muscle has needs no such proof.
         """
+        values: dict[str, tuple[float, Fit]] = {}
         for effect in self.found.effects:
             others = frozenset(self.found.names) - {effect.id}
             smaller = next((fit for fit in [self.base, *self.tried]
@@ -173,26 +174,29 @@ class BenchSelection:
                 continue
             added = [self.found, *(fit for fit in self.tried if fit is not self.found and (
                 len(fit.names) == len(self.found.names) and others < frozenset(fit.names)))]
-            value = self._significance(added, smaller)[0]
-            if value > SIGNIFICANCE:
-                self._leave_out(effect.id, 'beside the others it explains no more than chance '
-                                f'(p = {value:.2f})', smaller)
-                return True
-        return False
+            values[effect.id] = float(self._significance(added, smaller)[0]), smaller
+        name = max(values, key=lambda one: values[one][0], default=None)
+        if name is None or values[name][0] <= SIGNIFICANCE:
+            return False
+        value, smaller = values[name]
+        self._leave_out(name, 'beside the others it explains no more than chance '
+                        f'(p = {value:.2f})', smaller)
+        return True
 
     def _leave_out_unstable(self) -> bool:
         """
-        Leave out the effect that is named again on the fewest loads, if that is not on most.
+        Leave out the effect that is named again on the fewest loads, if that is on less than half.
 
         With a load left out, an effect is named again if the best set with it predicts that load
-        better than the best set without it, where both were fitted to the other loads.
+        better than the best set without it, where both were fitted to the other loads. On half of
+        them is enough: then the sizes of the errors decide, by which the set was chosen.
         """
         if not self.found.effects:
             return False
         without = {name: self._best_without(name) for name in self.found.names}
         share = {name: self._named_again(other) for name, other in without.items()}
         name = min(share, key=lambda one: share[one])
-        if share[name] > NAMED_AGAIN:
+        if share[name] >= NAMED_AGAIN:
             return False
         self._leave_out(name, f'with one load left out it is named again on '
                         f'{100.0 * share[name]:.0f} % of them', without[name])
@@ -214,7 +218,8 @@ class BenchSelection:
     def _best_without(self, name: str) -> Fit:
         """Return the best set that lacks an effect, and those that were left out before."""
         return min((fit for fit in [self.base, *self.sets]
-                    if not {name, *self.unstable}.intersection(fit.names)), key=self.error)
+                    if not {name, *self.unstable}.intersection(fit.names)),
+                   key=self.typical_error)
 
     def _named_again(self, other: Fit) -> float:
         """Return the share of folds that the set found predicts better than another one."""
@@ -232,6 +237,23 @@ class BenchSelection:
         """Return the held-out RMSE of a fit, in the unit of the response."""
         return self.fitter.error(fit.held_out)
 
+    def typical_error(self, fit: Fit) -> float:
+        """
+        Return the geometric mean over the folds of the RMSE held out there, which sets go by.
+
+        Each load has errors of its own size, unknown beforehand, so that the likelihood of all is
+        that of this mean; else the least load, for which the others are extrapolated, would decide
+        alone. What is too small to matter counts as no difference.
+        """
+        squares, rows = (np.bincount(self.problem.fold, weights=weights) for weights in (
+            (self.problem.measured - fit.held_out) ** 2, np.ones(len(fit.held_out))))
+        floor = self._small() ** 2
+        return float(np.exp(0.5 * np.mean(np.log(squares[rows > 0] / rows[rows > 0] + floor))))
+
+    def _small(self) -> float:
+        """Return the error below which none matters."""
+        return max(self.problem.noise, SMALL_ERROR * float(np.ptp(self.problem.measured)))
+
     def _gains(self, fit: Fit, base: Fit) -> np.ndarray:
         """
         Return the reduction of a base's squared error in each block, over the error there.
@@ -243,9 +265,8 @@ class BenchSelection:
         before, after = (significance.block_sums(
             (self.problem.measured - one.predicted) ** 2, self.problem.block)
             for one in (base, fit))
-        small = max(self.problem.noise, SMALL_ERROR * float(np.ptp(self.problem.measured)))
         return (before - after) / (
-            before + after + small ** 2 * np.bincount(self.problem.block))
+            before + after + self._small() ** 2 * np.bincount(self.problem.block))
 
     def _significance(self, fits: Sequence[Fit], base: Fit) -> np.ndarray:
         """Return family-wise p values of what fits explain beyond a base."""
@@ -256,13 +277,15 @@ class BenchSelection:
 
     def _helps(self, fit: Fit) -> bool:
         """Whether a fit explains enough of held-out rows to matter, and helps in most blocks."""
+        largest = (1.0 - self.settings.practical) * self.typical_error(self.base)
         gains = self._gains(fit, self.base)
-        return bool(self.error(fit) <= (1.0 - self.settings.practical) * self.error(self.base)
+        return bool(self.typical_error(fit) <= largest
                     and np.sum(gains[gains > 0.0]) >= CONSISTENT * np.sum(np.abs(gains)))
 
     def could_be(self, rival: Fit) -> bool:
         """Whether a rival could be the truth although the set found is better."""
-        if self.error(rival) <= (1.0 + self.settings.practical) * self.error(self.found):
+        largest = (1.0 + self.settings.practical) * self.typical_error(self.found)
+        if self.typical_error(rival) <= largest:
             return True
         theirs, own = (self.problem.measured - fit.held_out for fit in (rival, self.found))
         low, _ = significance.gain_interval(theirs, own, self.problem.block, self._rng)
