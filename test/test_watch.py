@@ -90,6 +90,23 @@ def test_holds_since_the_residual_left_the_band_are_judged():
     # 4.5 V has wiped 4 and 3.5 V; 2 V were passed on the way up.
     assert rows['voltage'][rows['history'] == 1.0].tolist() == [5.0, 3.0, 4.5]
     assert rows['time'][rows['history'] == 0.0].tolist() == [30.0 * n for n in range(7, 15)]
+    np.testing.assert_array_equal(rows['before_onset'], rows['history'])
+
+
+def test_what_began_acts_in_those_of_its_holds_that_are_old_by_now():
+    """They are history, but do not lie before the onset; of an arm in its band nothing does."""
+    watch = Watch(0.01, 600.0)
+    drives = [5.5, 1.5, *np.random.default_rng(3).uniform(2.0, 5.0, 58).tolist()]
+    for number, voltage in enumerate(drives[:10], 1):
+        watch.add(hold(number, 0.001, voltage))
+    assert 'before_onset' not in watch.measurement().columns
+    for number, voltage in enumerate(drives[10:], 11):
+        watch.add(hold(number, 0.1, voltage))
+    rows = watch.measurement().columns
+    assert rows['time'][rows['history'] == 0.0].min() > 900.0
+    np.testing.assert_array_equal(rows['before_onset'], rows['time'] <= 300.0)
+    old = rows['history'] > rows['before_onset']
+    assert old.any() and rows['before_onset'].any() and rows['time'][old].min() > 300.0
 
 
 def test_what_is_remembered_leads_an_operator_to_the_same_state():

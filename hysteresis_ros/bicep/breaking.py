@@ -51,6 +51,12 @@ class BreakingBalance:
         self._present = self._broken if broken else self._intact
         self._present.rewind(state)
 
+    def take_over(self, other: ArmBalance | BreakingBalance) -> None:
+        """Go on from the state of another arm; see `ArmBalance`."""
+        # What is broken by then breaks in the next sample.
+        self._present = self._intact
+        self._present.take_over(other._present if isinstance(other, BreakingBalance) else other)
+
     @property
     def output(self) -> float:
         """Output of H2 [m]; see `ArmBalance`."""
@@ -100,29 +106,29 @@ class BreakingBalance:
         angles, outputs, inputs : ndarray, shape (rows,)
             As of `ArmBalance.run`.
         """
-        columns = np.array([x, dt, offset, factor])
         rests, found, begin = [], np.empty((3, len(x))), 0
         for end in np.asarray(ends).tolist():
             own = slice(begin, end)
-            rest, *found[:, own] = self._trial(cold, columns[:, own], clock[own])
-            rests.append(rest)
+            rests.append(self.settle(cold, float(clock[begin] - dt[begin])))
+            found[:, own] = self.proceed(x[own], dt[own], offset[own], factor[own], clock[own])
             begin = end
         return np.array(rests), *found
 
-    def _trial(self, cold: float, columns: np.ndarray, clock: np.ndarray) -> tuple:
-        """Return rest, angles, outputs and inputs of one trial."""
+    def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
+                clock: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Go on from the present state, within one trial; see `ArmBalance`."""
+        columns = np.array([x, dt, offset, factor])
         first = int(np.searchsorted(clock, self.time, 'right'))
-        starts_broken = bool(clock[0] - columns[1, 0] > self.time)
-        if starts_broken or first == len(clock):
-            arm = self._broken if starts_broken else self._intact
-            return arm.run(cold, np.array([len(clock)]), *columns)
-        rest, *head = self._intact.run(cold, np.array([first]), *columns[:, :first])
+        if self._present is self._broken or first == len(clock):
+            return self._present.proceed(*columns)
+        head = self._intact.proceed(*columns[:, :first])
         self._broken.take_over(self._intact)
-        x, dt, offset, factor = columns[:, first].tolist()
-        before = self._intact.step(x, dt, offset, factor)
+        self._present = self._broken
+        before = self._intact.step(*columns[:, first].tolist())
         tail = self._broken.proceed(*columns[:, first:])
-        tail[0][0] = _on_its_way(before, tail[0][0], clock[first] - self.time, dt)
-        return rest, *(np.concatenate(pair) for pair in zip(head, tail))
+        tail[0][0] = _on_its_way(before, tail[0][0], clock[first] - self.time, float(dt[first]))
+        angles, outputs, inputs = (np.concatenate(pair) for pair in zip(head, tail))
+        return angles, outputs, inputs
 
 
 def _on_its_way(before: float, after: float, since: float, dt: float) -> float:

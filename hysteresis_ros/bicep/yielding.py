@@ -58,6 +58,13 @@ class YieldingBalance:
         self._residual, state = snapshot
         self._arm.rewind(state)
 
+    def take_over(self, other: ArmBalance | BreakingBalance | YieldingBalance) -> None:
+        """Go on from the state of another arm, with the residual strain that it has, if any."""
+        self._residual = 0.0
+        if isinstance(other, YieldingBalance):
+            self._residual, other = other._residual, other._arm
+        self._arm.take_over(other)
+
     @property
     def residual(self) -> float:
         """Residual elongation of each muscle so far [m]."""
@@ -120,7 +127,14 @@ class YieldingBalance:
         columns = np.array([x, dt, offset, factor, clock])
         for end in np.asarray(ends).tolist():
             rests.append(self.settle(cold, float(clock[begin] - dt[begin])))
-            for row, values in enumerate(columns[:, begin:end].T.tolist(), begin):
-                found[:, row] = self.step(*values), self.output, self.operators[0].input
+            found[:, begin:end] = self.proceed(*columns[:, begin:end])
             begin = end
         return np.array(rests), *found
+
+    def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
+                clock: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Go on from the present state, within one trial; see `ArmBalance`."""
+        angles, outputs, inputs = found = np.empty((3, len(x)))
+        for row, values in enumerate(np.array([x, dt, offset, factor, clock]).T.tolist()):
+            found[:, row] = self.step(*values), self.output, self.operators[0].input
+        return angles, outputs, inputs
