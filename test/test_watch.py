@@ -153,6 +153,22 @@ def test_diagnoses_have_to_agree_while_holds_come():
     assert watch.finding.holds == 12
 
 
+def test_an_answer_that_agrees_delays_none():
+    """It was on more holds, before the residual was seen to have left the band later."""
+    named = {}
+    for first in ('airflow', 'slack'):
+        watch = watched([0.001] * 20 + [0.03] * 11)
+        for count, numbers, name in ((11, (), first), (9, range(32, 41), 'airflow'),
+                                     (15, range(41, 47), 'airflow')):
+            for number in numbers:
+                watch.add(hold(number, 0.5))
+            assert watch.measurement().columns['history'].tolist().count(0.0) == count
+            watch.begun()
+            watch.answer(Found(missing=(name,)))
+        named[first] = watch.finding.effects
+    assert named == {'airflow': ('airflow',), 'slack': ('airflow',)}
+
+
 def test_what_shows_in_some_holds_only_has_left_the_band_since_the_first():
     """As an end stop does; two that are a little off may be chance."""
     offs = [0.0] * 20 + [0.05, 0.08, 0.05, *[0.0] * 7, 0.08, 0.08, 0.08, 0.05, 0.0, 0.0]

@@ -267,7 +267,8 @@ class Watch:
         while not set.intersection(*(names for _, names in agreed)):
             agreed.pop(0)
         self._answers = agreed
-        if self._diagnosed < GROWTH * agreed[0][0]:
+        # One more that agrees, on holds since an earlier moment, makes none later.
+        if self._diagnosed < GROWTH * min(count for count, _ in agreed):
             return
         if effects or found.verdict == 'unknown':
             self.finding = Finding(effects, others, probability(found, named), self._since,
