@@ -90,6 +90,23 @@ def test_holds_since_the_residual_left_the_band_are_judged():
     # 4.5 V has wiped 4 and 3.5 V; 2 V were passed on the way up.
     assert rows['voltage'][rows['history'] == 1.0].tolist() == [5.0, 3.0, 4.5]
     assert rows['time'][rows['history'] == 0.0].tolist() == [30.0 * n for n in range(7, 15)]
+    np.testing.assert_array_equal(rows['before_onset'], rows['history'])
+
+
+def test_what_began_acts_in_those_of_its_holds_that_are_old_by_now():
+    """They are history, but do not lie before the onset; of an arm in its band nothing does."""
+    watch = Watch(0.01, 600.0)
+    drives = [5.5, 1.5, *np.random.default_rng(3).uniform(2.0, 5.0, 58).tolist()]
+    for number, voltage in enumerate(drives[:10], 1):
+        watch.add(hold(number, 0.001, voltage))
+    assert 'before_onset' not in watch.measurement().columns
+    for number, voltage in enumerate(drives[10:], 11):
+        watch.add(hold(number, 0.1, voltage))
+    rows = watch.measurement().columns
+    assert rows['time'][rows['history'] == 0.0].min() > 900.0
+    np.testing.assert_array_equal(rows['before_onset'], rows['time'] <= 300.0)
+    old = rows['history'] > rows['before_onset']
+    assert old.any() and rows['before_onset'].any() and rows['time'][old].min() > 300.0
 
 
 def test_what_is_remembered_leads_an_operator_to_the_same_state():
@@ -134,6 +151,22 @@ def test_diagnoses_have_to_agree_while_holds_come():
             watch.add(hold(count + number, 0.1))
     assert watch.finding.effects == ('slack',) and watch.finding.others == ('backlash',)
     assert watch.finding.holds == 12
+
+
+def test_an_answer_that_agrees_delays_none():
+    """It was on more holds, before the residual was seen to have left the band later."""
+    named = {}
+    for first in ('airflow', 'slack'):
+        watch = watched([0.001] * 20 + [0.03] * 11)
+        for count, numbers, name in ((11, (), first), (9, range(32, 41), 'airflow'),
+                                     (15, range(41, 47), 'airflow')):
+            for number in numbers:
+                watch.add(hold(number, 0.5))
+            assert watch.measurement().columns['history'].tolist().count(0.0) == count
+            watch.begun()
+            watch.answer(Found(missing=(name,)))
+        named[first] = watch.finding.effects
+    assert named == {'airflow': ('airflow',), 'slack': ('airflow',)}
 
 
 def test_what_shows_in_some_holds_only_has_left_the_band_since_the_first():

@@ -131,8 +131,16 @@ class ArmBalance:
         self._state.motion[:], self._state.muscles[:] = motion, muscles
 
     def take_over(self, other: ArmBalance) -> None:
-        """Go on from the state of another arm, whose load may have been another."""
-        self.rewind(other.snapshot())
+        """
+        Go on from the state of another arm, whose load may have been another.
+
+        A single muscle there stands for all muscles here.
+        """
+        memories, motion, muscles = other.snapshot()
+        count = len(self.operators)
+        if len(memories) == 1 < count:
+            memories = memories * count
+        self.rewind((memories, motion, muscles))
         # No x was the last one here: what changes at once makes the arm ring.
         self._state.motion[X] = np.inf
 

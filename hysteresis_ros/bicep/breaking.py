@@ -51,6 +51,12 @@ class BreakingBalance:
         self._present = self._broken if broken else self._intact
         self._present.rewind(state)
 
+    def take_over(self, other: ArmBalance | BreakingBalance) -> None:
+        """Go on from the state of another arm; see `ArmBalance`."""
+        # What is broken by then breaks in the next sample.
+        self._present = self._intact
+        self._present.take_over(other._present if isinstance(other, BreakingBalance) else other)
+
     @property
     def output(self) -> float:
         """Output of H2 [m]; see `ArmBalance`."""

@@ -61,6 +61,13 @@ class YieldingBalance:
         self._residual, state = snapshot
         self._arm.rewind(state)
 
+    def take_over(self, other: ArmBalance | BreakingBalance | YieldingBalance) -> None:
+        """Go on from the state of another arm, with the residual strain that it has, if any."""
+        self._residual = 0.0
+        if isinstance(other, YieldingBalance):
+            self._residual, other = other._residual, other._arm
+        self._arm.take_over(other)
+
     @property
     def residual(self) -> float:
         """Residual elongation of each muscle so far [m]."""
@@ -124,13 +131,14 @@ class YieldingBalance:
         for end in np.asarray(ends).tolist():
             own = slice(begin, end)
             rests.append(self.settle(cold, float(clock[begin] - dt[begin])))
-            found[:, own] = self._trial(columns[:, own])
+            found[:, own] = self.proceed(*columns[:, own])
             begin = end
         return np.array(rests), *found
 
-    def _trial(self, columns: np.ndarray) -> np.ndarray:
-        """Return angles, outputs and inputs (3, rows) of a trial; arguments of `step` in rows."""
-        rows = columns.shape[1]
+    def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
+                clock: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Go on from the present state, within one trial; see `ArmBalance`."""
+        columns, rows = np.array([x, dt, offset, factor, clock]), len(x)
         found, begin, ahead = np.empty((3, rows)), 0, rows
         while begin < rows:
             held = 0
@@ -146,7 +154,8 @@ class YieldingBalance:
             begin += 1
             # While the load grows it yields row after row.
             ahead = 1 if self._residual > before else FURTHER
-        return found
+        angles, outputs, inputs = found
+        return angles, outputs, inputs
 
     def _hold(self, columns: np.ndarray, found: np.ndarray) -> int:
         """Fill `found` (3, rows) as far as nothing yields, go there, and return how far."""

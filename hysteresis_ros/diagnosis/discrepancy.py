@@ -72,6 +72,7 @@ class Offset(MaterialEffect):
     """A constant added to the elongation, to see what an error of the length does to the angle."""
 
     id = 'offset'
+    lasting = True
     parameters = (Parameter('size', 'm', 'what is added', 0.0, 1.0, 0.0, ()),)
 
     def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,

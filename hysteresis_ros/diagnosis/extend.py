@@ -22,7 +22,7 @@ from hysteresis_ros.diagnosis.simplest_forms import simplest_forms
 from hysteresis_ros.effects import Effect, effect_class
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements.quantities import shown
-from hysteresis_ros.model import MuscleModel
+from hysteresis_ros.model import MuscleModel, Simulator
 from hysteresis_ros.result import Brief, Result
 from hysteresis_ros.workers import one_blas_thread
 
@@ -112,11 +112,22 @@ class Extension(Result):
         return waterfall(self.steps, None, self.quantity)
 
 
-def rmse(model: MuscleModel, measurements: Iterable[Measurement]) -> float:
-    """Return the root mean square error of a model over recordings, in the response's unit."""
+def rmse(model: MuscleModel, measurements: Iterable[Measurement],
+         before: Sequence[Effect] | None = None) -> float:
+    """
+    Return the root mean square error of a model over recordings, in the response's unit.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    measurements : iterable of Measurement
+    before : sequence of Effect, optional
+        Effects that act before the onset, in recordings that have one; all of the model by default.
+    """
     squares, rows = 0.0, 0
     for measurement in measurements:
-        error = model.predict(measurement) - measurement.column(measurement.response)
+        predicted = Simulator(model, measurement, before=before).run(model.effects, exact=True)
+        error = predicted - measurement.column(measurement.response)
         squares += float(np.sum(error ** 2))
         rows += len(error)
     return float(np.sqrt(squares / rows))
@@ -208,14 +219,15 @@ def _gained(model: MuscleModel, problem: ArmProblem | BenchProblem,
     added = stages[-1][1]
     extended = _stamped(models[-1][1], added, train, problem.kind, by_hand)
     models[-1] = (models[-1][0], extended)
-    steps = [(name, rmse(one, judged)) for name, one in models]
+    steps = [(name, rmse(one, judged, model.effects)) for name, one in models]
     # Where weights are refitted, the fair base is one that was refitted to the same rows.
     before = problem.completed(model.effects) if problem.refits else model
 
     def both(recordings: Sequence[Measurement]) -> dict[str, float]:
         if not recordings:
             return {}
-        return {'rmse_before': rmse(before, recordings), 'rmse_after': rmse(extended, recordings)}
+        return {'rmse_before': rmse(before, recordings, model.effects),
+                'rmse_after': rmse(extended, recordings, model.effects)}
     return Extension(extended, added, both(list(train)), both(list(test)), steps,
                      implausible, problem.response, warnings)
 

@@ -91,7 +91,7 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
         loads = arm.loads_between(np.min(angle), np.max(angle))
         for trial in simulator.trials:
             judged = rows[(rows >= trial.rows.start) & (rows < trial.rows.stop)] - trial.rows.start
-            drive_squared = chain.drive_squared(trial.drive, trial.inputs)
+            drive_squared = simulator.drive_squared(chain, trial, simulator.past(effects))
             first.reset()
             cold = chain.to_drive_squared(model.cold_drive)
             x = first.simulate(np.concatenate(([cold], drive_squared)))

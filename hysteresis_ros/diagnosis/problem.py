@@ -79,7 +79,9 @@ class Problem:
         rows = sum(len(judged_rows(m)) for m in measurements)
         self.stride = max(1, rows // MOST_ROWS)
         self.chosen = [judged_rows(m)[::self.stride] for m in measurements]
-        self.simulators = [Simulator(model, *pair) for pair in zip(measurements, self.chosen)]
+        # What the model has acts before the onset of what is tried.
+        self.simulators = [Simulator(model, *pair, model.effects)
+                           for pair in zip(measurements, self.chosen)]
         if not any(map(len, self.chosen)):
             raise MeasurementError(f'{measurements[0].source}: every row is history (the column '
                                    "'history' is not 0), so none is left to judge")

@@ -28,6 +28,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.diagnose import FEWEST_ROWS
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.table import Measurement
+from hysteresis_ros.model.onset import COLUMN as ONSET
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.verdict import Diagnosis
@@ -183,8 +184,10 @@ class Watch:
             self._evidence = 0.0
             self._forget_answers()
             return
+        # Those before the change may be history by now.
+        long_ago = self.out_of_band and self._since < holds[0].time
         self._evidence, first = left_the_band(ratios)
-        since = holds[first - 1].time if first else self._floor
+        since = holds[first - 1].time if first else self._since if long_ago else self._floor
         if not self.out_of_band:
             self._forget_answers()
         self._since = since
@@ -224,7 +227,8 @@ class Watch:
         Returns
         -------
         Measurement
-            Rows that are settled. Where 'history' is 1 they only lead the model to its state.
+            Rows that are settled. Where 'history' is 1 they only lead the model to its state, and
+            where 'before_onset' is 1 nothing that is tried has acted yet.
 
         Raises
         ------
@@ -238,7 +242,7 @@ class Watch:
             raise MeasurementError('monitor: no hold of the arm has ended yet since the muscle was '
                                    'cold with its memory wiped' if self._known else UNKNOWN)
         history = remembered([*self._history, *(hold for hold, _ in self._holds[:begin])])
-        return as_measurement(history, self._holds[begin:])
+        return as_measurement(history, self._holds[begin:], since)
 
     def begun(self) -> None:
         """Take note that `measurement` is being diagnosed."""
@@ -263,7 +267,8 @@ class Watch:
         while not set.intersection(*(names for _, names in agreed)):
             agreed.pop(0)
         self._answers = agreed
-        if self._diagnosed < GROWTH * agreed[0][0]:
+        # One more that agrees, on holds since an earlier moment, makes none later.
+        if self._diagnosed < GROWTH * min(count for count, _ in agreed):
             return
         if effects or found.verdict == 'unknown':
             self.finding = Finding(effects, others, probability(found, named), self._since,
@@ -326,8 +331,8 @@ def remembered(holds: Sequence[Hold]) -> list[Hold]:
     return kept
 
 
-def as_measurement(history: Sequence[Hold],
-                   holds: Sequence[tuple[Hold, bool]]) -> Measurement:
+def as_measurement(history: Sequence[Hold], holds: Sequence[tuple[Hold, bool]],
+                   since: float = -math.inf) -> Measurement:
     """
     Return holds as the rows of one trial that began when the muscle was cold.
 
@@ -337,6 +342,8 @@ def as_measurement(history: Sequence[Hold],
         Not judged.
     holds : sequence of (Hold, bool)
         With whether each is judged.
+    since : float
+        Time [s] of the last hold before the residual left the band.
 
     Returns
     -------
@@ -350,4 +357,6 @@ def as_measurement(history: Sequence[Hold],
         columns['ambient_temperature'] = ambient
     columns['trial'] = np.zeros(len(rows))
     columns['history'] = np.array([0.0 if judged else 1.0 for _, judged in rows])
+    if any(hold.time <= since for hold, _ in rows):
+        columns[ONSET] = np.array([1.0 if hold.time <= since else 0.0 for hold, _ in rows])
     return Measurement.from_columns(columns, 'monitor')

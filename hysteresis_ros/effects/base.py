@@ -192,6 +192,8 @@ class Effect(abc.ABC):
     universal: ClassVar[bool] = False
     # Whether a controller undoes it.
     invertible: ClassVar[bool] = True
+    # Whether it acts before the onset of what a diagnosis tries, too: an error of the model.
+    lasting: ClassVar[bool] = False
     # Names of the attributes that hold what it remembers of the past; `start` sets them.
     memory: ClassVar[tuple[str, ...]] = ()
 

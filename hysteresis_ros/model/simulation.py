@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import copy
 import dataclasses
-from typing import NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.kernels.thinned import balanced_rows, between
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
+from hysteresis_ros.model.onset import Past, rows_before, rows_of
 from hysteresis_ros.model.stepper import Stepper
 from hysteresis_ros.operators import HysteresisOperator
 
@@ -133,13 +134,26 @@ class Simulator:
     judged : ndarray of int, shape (m,), optional
         Rows of the measurement that are looked at; the others may be interpolated where that does
         not change these. All by default.
+    before : sequence of Effect, optional
+        Effects that act in the rows of an arm run that lie before the onset of all others; see
+        `model.onset`. By default there is no onset.
+
+    Raises
+    ------
+    MeasurementError
+        If the rows before the onset are not the first ones of a single trial.
     """
 
     def __init__(self, model: MuscleModel, measurement: Measurement,
-                 judged: np.ndarray | None = None) -> None:
+                 judged: np.ndarray | None = None, before: Sequence[Effect] | None = None
+                 ) -> None:
         self.model = model
         self.measurement = measurement
         self.trials = trials_of(model, measurement)
+        self._before = list(before or ())
+        self._onset = (rows_before(measurement)
+                       if before is not None and measurement.response == 'angle' else 0)
+        self._pasts: dict[tuple, Past] = {}
         self._asked: np.ndarray | None = None
         if judged is not None and len(judged) < measurement.rows:
             self._asked = np.zeros(measurement.rows, dtype=bool)
@@ -190,7 +204,8 @@ class Simulator:
              exact: bool = False) -> tuple[np.ndarray, np.ndarray | None]:
         """Return the response, and the martensite share where effects need it, each (rows,)."""
         chain = Chain(effects, self._surroundings)
-        respond = self._responder(chain, exact)
+        past = self.past(effects)
+        respond = self._responder(chain, exact, past)
         result = np.empty(self.measurement.rows)
         phase = None
         if chain.needs_phase:
@@ -205,7 +220,8 @@ class Simulator:
             if chain.yields[0] < np.inf:
                 # What a trial leaves behind the next ones begin with.
                 agree = [all(agree)] * len(found)
-            by_row = exact and self.measurement.response == 'angle' and not all(agree)
+            by_row = (exact and self.measurement.response == 'angle' and past is None
+                      and not all(agree))
             arm = self._balance(chain) if by_row else None
             responses = [
                 one.response if arm is None or agrees else self._row_by_row(chain, one.trial, arm)
@@ -213,10 +229,29 @@ class Simulator:
         else:
             responses = respond(self.trials)
         for trial, response in zip(self.trials, responses):
-            result[trial.rows] = chain.measured(response.values, trial.inputs, response.rest)
+            result[trial.rows] = (
+                chain.measured(response.values, trial.inputs, response.rest) if past is None
+                else past.measured(chain, response.values, trial.inputs))
             if inputs_of_stage is not None and response.inputs is not None:
                 inputs_of_stage.append(response.inputs)
         return result, phase
+
+    def past(self, effects: Sequence[Effect]) -> Past | None:
+        """Return what the arm has done before the onset, None if these effects always act."""
+        if not self._onset:
+            return None
+        lasting = [effect for effect in effects if effect.lasting]
+        key = tuple((effect.id, *effect.values.values()) for effect in lasting)
+        if key not in self._pasts:
+            chain = Chain([*self._before, *lasting], self._surroundings)
+            whole, first = self.trials[0], slice(self._onset)
+            trial = dataclasses.replace(
+                whole, rows=first, drive=whole.drive[first], load=whole.load[first],
+                inputs=rows_of(whole.inputs, first))
+            balance = self._balance(chain)
+            response = self._row_by_row(chain, trial, balance)
+            self._pasts[key] = Past(chain, response, balance, self._phase(response.output))
+        return self._pasts[key]
 
     def run_many(self, sets: Sequence[Sequence[Effect]], jobs: int = 1) -> np.ndarray:
         """
@@ -293,7 +328,7 @@ class Simulator:
             return np.clip((high - given) / max(high - low, 1e-12), 0.0, 1.0)
         return self.model.martensite(given)
 
-    def _responder(self, chain: Chain, exact: bool = False
+    def _responder(self, chain: Chain, exact: bool = False, past: Past | None = None
                    ) -> Callable[[Sequence[Trial]], list[Response]]:
         """Return what gives the responses of trials."""
         response = self.measurement.response
@@ -306,6 +341,9 @@ class Simulator:
         first = self.model.first_stage(chain)
         if response == 'angle':
             balance = self._balance(chain)
+            if past is not None:
+                return lambda trials: [self._angles_since(past, chain, first, balance, trial)
+                                       for trial in trials]
             asked = None if exact or chain.moves else self._asked
             return lambda trials: self._angles(chain, first, balance, asked, trials)
         stage = self.model.require_length_stage(chain)
@@ -330,10 +368,17 @@ class Simulator:
         # Each thread has a state of its own.
         return made.copy()
 
-    def _first(self, chain: Chain, first: FirstStage, trial: Trial
+    @staticmethod
+    def drive_squared(chain: Chain, trial: Trial, past: Past | None = None) -> np.ndarray:
+        """Return the drive squared that the muscle feels in the rows of a trial, (rows,)."""
+        if past is None:
+            return chain.drive_squared(trial.drive, trial.inputs)
+        return past.drive_squared(chain, trial.drive, trial.inputs)
+
+    def _first(self, chain: Chain, first: FirstStage, trial: Trial, past: Past | None = None
                ) -> tuple[float, np.ndarray, np.ndarray]:
         """Return x in the cold state, and x and drive squared of each row."""
-        drive_squared = chain.drive_squared(trial.drive, trial.inputs)
+        drive_squared = self.drive_squared(chain, trial, past)
         cold = chain.to_drive_squared(self.model.cold_drive)
         first.reset()
         x = first.simulate(np.concatenate(([cold], drive_squared)))
@@ -398,6 +443,19 @@ class Simulator:
                                            for column in (angles, outputs, inputs))
             responses.append(Response(angles, outputs, inputs, angle))
         return responses
+
+    def _angles_since(self, past: Past, chain: Chain, first: FirstStage, balance: Lifting,
+                      trial: Trial) -> Response:
+        """Return what the arm does: what is known before the onset, and what follows."""
+        since = slice(past.rows, None)
+        _, x, drive_squared = self._first(chain, first, trial, past)
+        offset, factor = chain.drift(trial.drive, drive_squared, trial.inputs)
+        arm: Any = balance
+        arm.take_over(past.balance)
+        found = arm.proceed(*(column[since] for column in (
+            x, trial.inputs.dt, offset, factor, trial.inputs.clock)))
+        angles, outputs, inputs = np.concatenate((past.columns, found), axis=1)
+        return Response(angles, outputs, inputs, past.rest)
 
 
 def _beside(clock: np.ndarray, time: float) -> np.ndarray:
