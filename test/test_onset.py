@@ -101,6 +101,27 @@ def test_what_is_remembered_is_handed_over(in_use, begun):
     assert np.max(np.abs(found - always)[:BEFORE]) > 1e-4
 
 
+def test_wires_with_other_weights_have_been_through_the_same():
+    """As ends that stay cold have been from the beginning, though they count from the onset on."""
+    run, begun = run_with_onset(), effects_of(['cold_clamps'])
+    stage = MODEL.require_length_stage(Chain(begun, MODEL.surroundings))
+    assert len(stage.nodes) > len(MODEL.require_length_stage().nodes)
+    inputs = []
+    plain = Simulator(MODEL, run).run([], inputs)
+    found = simulated(run, [], begun)
+    np.testing.assert_array_equal(found[:BEFORE], plain[:BEFORE])
+    # An arm with cold ends whose H2 has had the inputs of the other arm.
+    arm = MODEL.lifting(Chain(begun, MODEL.surroundings))
+    first = MODEL.first_stage(Chain([], MODEL.surroundings))
+    arm.settle(first.step(0.0))
+    arm.operators[0].simulate(inputs[0][:BEFORE])
+    x = first.simulate(run.column('voltage') ** 2)
+    angles = [arm.step(value, 4.0) for value in x[BEFORE:].tolist()]
+    # What corners do not tell is how far beyond the range of H2 the input has been.
+    np.testing.assert_allclose(found[BEFORE:], angles, rtol=0.0, atol=1e-4)
+    assert np.max(np.abs(found - plain)) > 0.03
+
+
 @pytest.mark.parametrize('name', sorted(set(STRENGTHS) - {'valve_lag'}))
 def test_nothing_that_begins_acts_before(name):
     """And the arm of the model in use goes on as if there had been no onset."""

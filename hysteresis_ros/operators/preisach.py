@@ -136,6 +136,18 @@ class Preisach(CompiledOperator):
         kernel.recall(self.table, self.memory, u)
         self.memory[layout.SATURATED] = saturated
 
+    def take_over(self, other: 'Preisach') -> None:
+        """
+        Go on with what an operator with other weights, maybe on fewer nodes, has been through.
+
+        Only corners are known of that. Relays that it lacks below its range have seen the largest
+        input of these, the upper end if there is none, and then the lower one.
+        """
+        self.reset()
+        corners = other.corners
+        largest = corners[0] if corners else other.upper
+        self.simulate(np.array([largest, other.lower, *corners, other.input]))
+
     def areas(self, inputs: np.ndarray) -> np.ndarray:
         """Return the signed areas after inputs from the cold state, shape (M, cells)."""
         return signed_areas(self.nodes, inputs)
