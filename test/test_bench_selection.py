@@ -14,13 +14,15 @@ from hysteresis_ros.measurements.table import Measurement
 
 @pytest.mark.slow
 @pytest.mark.parametrize('muscle, seed', [
-    ('lagoudas', 6302), ('lagoudas', 6311), ('brinson', 6353), ('brinson', 6344)])
+    ('lagoudas', 6302), ('lagoudas', 6311), ('brinson', 6353), ('brinson', 6602),
+    ('brinson', 6601), ('brinson', 6708)])
 def test_what_the_load_does_is_named_on_every_specimen_and_no_wear(muscle, seed):
     """
-    Wear that is not there takes a twentieth off the error of one of four loads held out.
+    Wear that is not there takes a twentieth to a half off the error of one of four loads held out.
 
-    Of the third and fourth specimen what is named predicts two or three of four loads much better,
-    and the least, which lies beyond the others, worse.
+    What is named predicts two of four loads of the third specimen much better, and the least, which
+    lies beyond the others, worse. Of the fourth it predicts all much better, though chance could
+    give that much of fitted rows; of the fifth it begins worse than other sets when it is fitted.
     """
     tables = bench_tables({}, seed, muscle)
     force, length = (Measurement.from_columns(tables[f'{name}.csv'])

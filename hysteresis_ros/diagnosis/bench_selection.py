@@ -100,7 +100,8 @@ class BenchSelection:
         values = self._significance(self.tried, self.base)
         self.p_values = {fit.names: float(value) for fit, value in zip(self.tried, values)}
         self.sets = [fit for fit, value in zip(self.tried, values)
-                     if not fit.implausible() and value <= SIGNIFICANCE and self._helps(fit)]
+                     if not fit.implausible() and self._helps(fit)
+                     and (value <= SIGNIFICANCE or self._log_odds(fit, self.base) > 0.0)]
         if not self.sets:
             return
         best = min(map(self.typical_error, self.sets))
@@ -131,10 +132,14 @@ class BenchSelection:
                       if name not in fit.names}
             begun = self._in_parallel(_begun, self._search, [
                 effects for effects in larger.values() if not _replaced(effects)])
-            generation = self._best(self._in_parallel(_fitted, self._search, [
-                fit.effects for fit in self._best(begun, 2 * GROWN)]), GROWN)
-            errors.update((frozenset(fit.names), self._fitted_error(fit)) for fit in generation)
-            found += [fit for fit in generation if self._all_help(fit, errors)]
+            # What every loaded muscle has, and one effect more, may well begin worse than it ends.
+            chosen = self._best(begun, 2 * GROWN)
+            chosen += [fit for fit in begun if fit not in chosen and _but_one_universal(fit)]
+            fitted = self._in_parallel(_fitted, self._search, [fit.effects for fit in chosen])
+            generation = self._best(fitted, GROWN)
+            errors.update((frozenset(fit.names), self._fitted_error(fit)) for fit in fitted)
+            found += [fit for fit in fitted if (fit in generation or _but_one_universal(fit))
+                      and self._all_help(fit, errors)]
         return found
 
     def _best(self, fits: Sequence[Fit], count: int) -> list[Fit]:
@@ -237,22 +242,30 @@ class BenchSelection:
         """Return the held-out RMSE of a fit, in the unit of the response."""
         return self.fitter.error(fit.held_out)
 
-    def typical_error(self, fit: Fit) -> float:
+    def typical_error(self, fit: Fit, least: float | None = None) -> float:
         """
         Return the geometric mean over the folds of the RMSE held out there, which sets go by.
 
         Each load has errors of its own size, unknown beforehand, so that the likelihood of all is
         that of this mean; else the least load, for which the others are extrapolated, would decide
-        alone. What is too small to matter counts as no difference.
+        alone. Differences below `least` count as none; by default below what matters.
         """
         squares, rows = (np.bincount(self.problem.fold, weights=weights) for weights in (
             (self.problem.measured - fit.held_out) ** 2, np.ones(len(fit.held_out))))
-        floor = self._small() ** 2
+        floor = (self._small() if least is None else least) ** 2
         return float(np.exp(0.5 * np.mean(np.log(squares[rows > 0] / rows[rows > 0] + floor))))
 
     def _small(self) -> float:
         """Return the error below which none matters."""
         return max(self.problem.noise, SMALL_ERROR * float(np.ptp(self.problem.measured)))
+
+    def _log_odds(self, fit: Fit, base: Fit) -> float:
+        """Return the log posterior odds of a fit against another one; see `probabilities`."""
+        count = len(np.unique(self.problem.block))
+        prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
+        before, after = (max(self.typical_error(one, self.problem.noise), 1e-300)
+                         for one in (base, fit))
+        return prior * (len(fit.effects) - len(base.effects)) + count * math.log(before / after)
 
     def _gains(self, fit: Fit, base: Fit) -> np.ndarray:
         """
@@ -308,17 +321,18 @@ class BenchSelection:
         """
         Return the tried sets with the probability that their held-out errors give them.
 
-        As many independent rows as there are blocks, of unknown variance: the likelihood goes
-        with the RMSE to the power of minus that number.
+        As many independent rows as there are blocks, of unknown variance on each load: the
+        likelihood goes with the typical error to the power of minus that number.
         """
         fits = [self.base, *self.sets]
-        count = len(np.unique(self.problem.block))
-        odds = math.log(self.settings.prior / (1.0 - self.settings.prior))
-        logs = np.array([
-            odds * len(fit.effects) - count * math.log(max(self.error(fit), 1e-300))
-            for fit in fits])
+        logs = np.array([self._log_odds(fit, self.base) for fit in fits])
         weights = np.exp(logs - logs.max())
         return list(zip(fits, (weights / weights.sum()).tolist()))
+
+
+def _but_one_universal(fit: Fit) -> bool:
+    """Whether every loaded muscle has all but one of the effects of a fit."""
+    return sum(not effect.universal for effect in fit.effects) == 1
 
 
 def _replaced(effects: Sequence[Effect]) -> bool:
