@@ -106,14 +106,7 @@ class BreakingBalance:
         angles, outputs, inputs : ndarray, shape (rows,)
             As of `ArmBalance.run`.
         """
-        columns = np.array([x, dt, offset, factor, clock])
-        rests, found, begin = [], np.empty((3, len(x))), 0
-        for end in np.asarray(ends).tolist():
-            own = slice(begin, end)
-            rests.append(self.settle(cold, float(clock[begin] - dt[begin])))
-            found[:, own] = self.proceed(*columns[:, own])
-            begin = end
-        return np.array(rests), *found
+        return run_trials(self, cold, ends, np.array([x, dt, offset, factor, clock]))
 
     def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
                 clock: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -137,6 +130,18 @@ class BreakingBalance:
         self._broken.take_over(self._intact)
         self._present = self._broken
         return self._intact.step(x, dt, offset, factor)
+
+
+def run_trials(arm: Any, cold: float, ends: np.ndarray, columns: np.ndarray
+               ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Run whole trials of an arm that can settle and proceed; see `BreakingBalance.run`."""
+    clock, dt = columns[4], columns[1]
+    rests, found, begin = [], np.empty((3, columns.shape[1])), 0
+    for end in np.asarray(ends).tolist():
+        rests.append(arm.settle(cold, float(clock[begin] - dt[begin])))
+        found[:, begin:end] = arm.proceed(*columns[:, begin:end])
+        begin = end
+    return np.array(rests), *found
 
 
 def _on_its_way(before: float, after: float, since: float, dt: float) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hysteresis_ros.bicep.balance import ArmBalance
-from hysteresis_ros.bicep.breaking import BreakingBalance
+from hysteresis_ros.bicep.breaking import BreakingBalance, run_trials
 from hysteresis_ros.operators import HysteresisOperator
 
 # A residual elongation is found to this [m], in so many trials at most.
@@ -126,14 +126,7 @@ class YieldingBalance:
             ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Run all trials of a recording, each from the cold state; see `BreakingBalance`."""
         self._residual = 0.0
-        rests, found, begin = [], np.empty((3, len(x))), 0
-        columns = np.array([x, dt, offset, factor, clock])
-        for end in np.asarray(ends).tolist():
-            own = slice(begin, end)
-            rests.append(self.settle(cold, float(clock[begin] - dt[begin])))
-            found[:, own] = self.proceed(*columns[:, own])
-            begin = end
-        return np.array(rests), *found
+        return run_trials(self, cold, ends, np.array([x, dt, offset, factor, clock]))
 
     def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
                 clock: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
