@@ -14,7 +14,7 @@ from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import LinearModel, simulation, Simulator
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.simulation import trials_of
+from hysteresis_ros.model.trials import trials_of
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY, STRENGTHS, wandering_voltage
 
 VOLTAGE = wandering_voltage(800, seed=2)

@@ -15,7 +15,7 @@ from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import Simulator
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.simulation import trials_of
+from hysteresis_ros.model.trials import trials_of
 from model_support import arm_run, bicep_model, effect_of, STRENGTHS, wandering_voltage
 
 MODEL = bicep_model()
