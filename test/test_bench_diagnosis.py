@@ -162,7 +162,7 @@ def test_an_effect_more_has_to_matter(practical, missing):
 
 @pytest.mark.parametrize('p_value, missing', [
     (0.04, ['creep', 'valve_lag']), (0.06, ['valve_lag'])])
-def test_an_effect_more_has_to_explain_more_than_chance_beside_the_first(
+def test_an_effect_more_has_to_explain_more_than_chance_given_the_first(
         monkeypatch, p_value, missing):
     """Where all sets are tested together, or the only other one, each of them does."""
     monkeypatch.setattr(

@@ -164,7 +164,7 @@ class BenchSelection:
 
     def _leave_out_chance(self) -> bool:
         """
-        Leave out an effect that explains, beside the others, no more than one would by chance.
+        Leave out an effect that, given the others of the set, explains no more than chance.
 
         It was the best of all that could have been added to the others, which are tested together.
         What every loaded muscle has needs no such proof.
@@ -184,7 +184,7 @@ class BenchSelection:
         if name is None or values[name][0] <= SIGNIFICANCE:
             return False
         value, smaller = values[name]
-        self._leave_out(name, 'beside the others it explains no more than chance '
+        self._leave_out(name, 'given the others it explains no more than chance '
                         f'(p = {value:.2f})', smaller)
         return True
 
