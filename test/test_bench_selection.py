@@ -2,14 +2,64 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which effects a bench is said to show, where the best of some that it has not come close."""
 
+import dataclasses
+
+import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.diagnosis.bench_selection import BenchSelection
 from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.measurements.table import Measurement
+
+
+def bench_of(muscle, seed):
+    """Return the model of a bench without effects, and its lengths."""
+    tables = bench_tables({}, seed, muscle)
+    force, length = (Measurement.from_columns(tables[f'{name}.csv'])
+                     for name in ('force', 'length'))
+    return identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY),
+                    length_trials=range(4), force_trials=[0]).model, length.select(range(4))
+
+
+@pytest.fixture(scope='module')
+def selection():
+    """Return a selection for a bench that has tried nothing."""
+    model, length = bench_of('grains', 1)
+    return BenchSelection(problem_for(model, [length]), Settings(), np.random.default_rng(0), 1,
+                          lambda items, total: items)
+
+
+def test_what_was_left_out_does_not_come_back(selection):
+    """Two sets that each lack an effect of the other could take turns without an end."""
+    base = selection.base
+    selection.sets = [dataclasses.replace(base, effects=[catalogue()[name]() for name in names])
+                      for names in (('slack', 'fatigue'), ('slack', 'r_phase'))]
+    better = [dataclasses.replace(fit, held_out=0.5 * (
+        base.held_out + selection.problem.measured)) for fit in selection.sets]
+    selection.sets = better
+    assert selection._best_without('r_phase') is better[0]
+    selection.unstable['fatigue'] = 'not named again'
+    assert selection._best_without('r_phase') is base
+    selection.sets, selection.unstable = [], {}
+
+
+def test_every_load_counts_alike_whatever_its_error(selection):
+    """The geometric mean of the errors on four loads; what is below the floor is no less."""
+    errors = np.array([1e-3, 2e-3, 4e-3, 8e-3])
+    fit = dataclasses.replace(selection.base, held_out=(
+        selection.problem.measured + errors[selection.problem.fold]))
+    assert selection.typical_error(fit, 0.0) == pytest.approx(8e-3 ** 0.5 * 1e-3 ** 0.5)
+    assert selection.typical_error(fit, 1.0) == pytest.approx(1.0, rel=1e-4)
+    # By default a hundredth of the range: differences of less do not matter.
+    assert selection.typical_error(selection.base) > 0.01 * np.ptp(
+        selection.problem.measured)
 
 
 @pytest.mark.slow
@@ -24,11 +74,7 @@ def test_what_the_load_does_is_named_on_every_specimen_and_no_wear(muscle, seed)
     lies beyond the others, worse. Of the fourth it predicts all much better, though chance could
     give that much of fitted rows; of the fifth it begins worse than other sets when it is fitted.
     """
-    tables = bench_tables({}, seed, muscle)
-    force, length = (Measurement.from_columns(tables[f'{name}.csv'])
-                     for name in ('force', 'length'))
-    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY),
-                     length_trials=range(4), force_trials=[0]).model
-    found = diagnose(model, [length.select(range(4))], seed=0)
+    model, length = bench_of(muscle, seed)
+    found = diagnose(model, [length], seed=0)
     assert {'stress_dependence', 'stress_dependent_strain', 'transformation_slopes'} == {
         *found.missing} - {'series_compliance'}
