@@ -4,6 +4,8 @@
 
 import importlib
 import json
+import os
+import subprocess
 import sys
 
 from hysteresis_ros.laboratory import hidden_effects
@@ -15,7 +17,7 @@ def tool(root):
     """Return the tool, whose folder is on the path only while it is run."""
     sys.path.insert(0, str(root / 'tools'))
     try:
-        yield importlib.import_module('hidden')
+        yield importlib.import_module('hidden_cases')
     finally:
         sys.path.remove(str(root / 'tools'))
 
@@ -106,3 +108,15 @@ def test_outputs_without_muscle_and_probabilities_can_still_be_rendered(scores):
     text = scores.to_markdown([old])
     assert '| score | asked | grains | cases |' in text and '| `slack` | 0 of 0 | ' in text
     assert 'probability' not in text
+
+
+@pytest.mark.slow
+def test_the_grid_runs_in_processes_of_its_own(root, tmp_path):
+    written = tmp_path / 'hidden.json'
+    ran = subprocess.run(
+        [sys.executable, str(root / 'tools/hidden.py'), '--seeds', '0', '--others', '1', '--only',
+         'none', '--jobs', '2', written], capture_output=True, text=True, check=False,
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join([str(root), *sys.path])})
+    assert ran.returncode == 0, ran.stderr
+    found, = json.loads(written.read_text(encoding='utf-8'))['cases']
+    assert found['group'] == 'none' and found['verdict'] == 'adequate'
