@@ -74,7 +74,7 @@ def to_markdown(results: dict[str, list[Row]]) -> str:
     Parameters
     ----------
     results : dict of str to list of dict
-        What `hidden_cases.run` returned for every case, by the name of the variant; the first one is
+        What `hidden_cases.run` returned for every case, by name of variant; the first one is
         what the others are compared with. Scores that no case counts for are left out.
     """
     scores = {name: {key: value for key, (value, *_) in score(rows).items()}
