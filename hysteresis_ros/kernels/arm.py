@@ -12,6 +12,7 @@ import numpy as np
 
 from . import grid, root
 from .bundle import SEARCH, Wires
+from .jit import typed
 from .lean import lean
 
 # Columns of `Arm.grid`: angle [rad], elongation [m], moment to be held [N m], moment arm times
@@ -38,6 +39,7 @@ BUNDLE_SEARCH = REST_SEARCH + root.SIZE
 MOTION = BUNDLE_SEARCH + SEARCH
 
 
+@typed
 class Arm(NamedTuple):
     """
     Arm and parallel muscles, as tables.
@@ -74,6 +76,7 @@ class Arm(NamedTuple):
     plays: bool
 
 
+@typed
 class State(NamedTuple):
     """
     What an arm remembers.

@@ -12,6 +12,8 @@ from typing import Any, TypeVar
 import numba
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.extending import typeof_impl
+import numpy as np
 
 from hysteresis_ros.kernels.cache_folder import cache_folder
 
@@ -35,6 +37,34 @@ def compile_and_keep(function: Function) -> Function:
         with _caching_in(folder):
             compiled._cache = KernelCache(function)
     return compiled
+
+
+def remember_types(kind: type) -> None:
+    """
+    Have numba remember how it types the tuples of a class; anew in each call takes it 0.2 ms.
+
+    Parameters
+    ----------
+    kind : type
+        A named tuple of arrays, numbers and such tuples.
+    """
+    known: dict[tuple, Any] = {}
+    usual = typeof_impl.dispatch(tuple)
+
+    def remembered(value: tuple, context: Any) -> Any:
+        key = _key(value)
+        if key not in known:
+            known[key] = usual(value, context)
+        return known[key]
+
+    typeof_impl.register(kind, remembered)
+
+
+def _key(value: tuple) -> tuple:
+    """Return all that the type of a tuple depends on."""
+    return tuple([
+        (one.dtype, one.ndim, one.flags.num) if isinstance(one, np.ndarray)
+        else _key(one) if isinstance(one, tuple) else type(one) for one in value])
 
 
 class KernelCache(FunctionCache):

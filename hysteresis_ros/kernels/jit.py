@@ -12,9 +12,10 @@ import logging
 from typing import TypeVar
 
 Function = TypeVar('Function', bound=Callable)
+Kind = TypeVar('Kind', bound=type)
 
 try:
-    from hysteresis_ros.kernels.compiler import compile_and_keep
+    from hysteresis_ros.kernels.compiler import compile_and_keep, remember_types
 except ModuleNotFoundError as error:
     # Not every system has a package of numba. All works without, but for the time that it takes.
     if error.name != 'numba':
@@ -24,8 +25,17 @@ except ModuleNotFoundError as error:
         """Return the function as it is."""
         return function
 
+    def remember_types(kind: type) -> None:
+        """Nothing has types that count."""
+
     logging.getLogger(__name__).warning(
         'numba is not installed: simulations take 20 to 50 times as long; pip install numba')
+
+
+def typed(kind: Kind) -> Kind:
+    """Return a class of named tuples, of which compiled functions know the types at once."""
+    remember_types(kind)
+    return kind
 
 
 def jit(function: Function) -> Function:
