@@ -438,7 +438,8 @@ class BenchProblem(Problem):
         fit, design = best
         stage = _stage(design.nodes, fit.weights, fit.bias)
         metrics = dict(self.model.metrics)
-        metrics['length'] = {**metrics.get('length', {}), **left_out(fit, self.trial)}
+        metrics['length'] = {**metrics.get('length', {}), **left_out(
+            fit, self.trial, self.signals.get('load'))}
         return dataclasses.replace(
             self.model, effects=list(effects), length_stage=stage, metrics=metrics)
 

@@ -297,7 +297,7 @@ class _Problem:
             freedom = max(1.0, len(self.target) - float(np.sum(leverage)))
             noise = float(np.sqrt(np.sum((self.design @ x - self.target) ** 2) / freedom))
         return self._result(x, passive, covariance, noise, float(strength), np.array(strengths),
-                            np.array(validation) * self.output_range)
+                            np.array(validation) * self.output_range, held_out)
 
     def _polish(self, x: np.ndarray, passive: np.ndarray, strength: float) -> np.ndarray:
         """Solve again for the unknowns off their bound, without squaring the condition."""
@@ -309,7 +309,8 @@ class _Problem:
         return np.where(self.free, polished, np.maximum(polished, 0.0))
 
     def _result(self, x: np.ndarray, passive: np.ndarray, covariance: np.ndarray, noise: float,
-                strength: float, strengths: np.ndarray, validation: np.ndarray) -> WeightFit:
+                strength: float, strengths: np.ndarray, validation: np.ndarray,
+                held_out: np.ndarray | None = None) -> WeightFit:
         weights = x[:-1] * self.unit[:-1]
         bias = float(x[-1] * self.unit[-1] + self.anchor.value - self.anchor.row @ weights)
         triangle = self._reduced[0]
@@ -327,4 +328,6 @@ class _Problem:
             condition=float(singular[0] / singular[rank - 1]),
             never_excited=tuple(int(k) for k in np.flatnonzero(still)),
             noise_std=noise * self.output_range, active=np.flatnonzero(passive),
-            covariance=covariance * scaled, origin=self.anchor.row)
+            covariance=covariance * scaled, origin=self.anchor.row,
+            held_out=(np.full(len(target), np.nan) if held_out is None
+                      else held_out * self.output_range))

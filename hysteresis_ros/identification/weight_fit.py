@@ -44,6 +44,9 @@ class WeightFit:
         Of those, for a unit `noise_std`.
     origin : ndarray, shape (K,)
         Row at which the output is known exactly; zeros without an anchor.
+    held_out : ndarray, shape (M,)
+        Output minus target at the strength chosen, each row held out with its fold; NaN if nothing
+        was held out.
     """
 
     weights: np.ndarray
@@ -62,6 +65,7 @@ class WeightFit:
     active: np.ndarray
     covariance: np.ndarray
     origin: np.ndarray
+    held_out: np.ndarray
 
     @property
     def held_out_rmse(self) -> float:

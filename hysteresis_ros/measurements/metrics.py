@@ -10,6 +10,8 @@ from hysteresis_ros.measurements import Measurement, settled_rows
 import numpy as np
 
 FEWEST_REPEATED_ROWS = 5
+# Loads that differ by less than this share of the largest are one.
+SAME_LOAD = 0.02
 
 
 class Errors(NamedTuple):
@@ -62,6 +64,37 @@ def errors(residual: np.ndarray, output_range: float) -> Errors:
     rmse = float(np.sqrt(np.mean(residual ** 2)))
     percent = 100.0 / output_range if output_range > 0 else np.nan
     return Errors(mean_abs, std, rmse, mean_abs * percent, std * percent)
+
+
+def rmse_by_load(residual: np.ndarray, load: np.ndarray, trial: np.ndarray
+                 ) -> dict[str, list[float]]:
+    """
+    Return the error under each load of a bench.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (rows,)
+    load : ndarray, shape (rows,)
+        Of which each trial has one, or goes about a mean.
+    trial : ndarray, shape (rows,)
+
+    Returns
+    -------
+    dict
+        'loads', ascending, in the unit of the load, and 'rmse_by_load', in that of the residual.
+
+    """
+    means = {one: float(np.mean(load[trial == one])) for one in np.unique(trial)}
+    largest = max(map(abs, means.values()))
+    groups: list[list[float]] = []
+    for one in sorted(means, key=means.__getitem__):
+        if groups and means[one] - means[groups[-1][0]] <= SAME_LOAD * largest:
+            groups[-1].append(one)
+        else:
+            groups.append([one])
+    chosen = [np.isin(trial, group) for group in groups]
+    return {'loads': [float(np.mean(load[rows])) for rows in chosen],
+            'rmse_by_load': [float(np.sqrt(np.mean(residual[rows] ** 2))) for rows in chosen]}
 
 
 def finite(value: float) -> float | None:
