@@ -209,6 +209,54 @@ def test_the_largest_error_that_the_bench_has_shown_counts():
     assert discrepancy.length_error(bicep_model(metrics={})) == 0.0
 
 
+def by_load(loads, **parts):
+    """Return metrics of a bench with an error [m] under each load [N], of each part."""
+    return {'length': {part: {'rmse': max(errors), 'loads': list(loads), 'rmse_by_load': errors}
+                       for part, errors in parts.items()}}
+
+
+def test_the_error_of_the_length_is_that_under_the_load_of_the_arm():
+    """And of the loads near it; outer ones were extrapolated to, which counts beyond them."""
+    loads, places = (1.0, 3.0, 5.0, 7.0), np.array([-1.0, 1.0, 3.0, 5.0, 7.0, 9.0])
+    asked = np.array([-9.0, -1.0, 1.0, 2.5, 5.0, 9.0, 20.0])
+
+    def error(**parts):
+        return discrepancy.length_errors(bicep_model(metrics=by_load(loads, **parts)), asked)
+    found = error(left_out=[8e-4, 2e-4, 1e-4, 6e-4], identification=[4e-4, 1e-5, 1e-5, 3e-4])
+    squares = 1e-8 * np.array([8.0, 4.0, 2.0, 1.0, 3.0, 6.0]) ** 2
+    for load, one in zip(np.clip(asked, -1.0, 9.0), found):
+        near = np.exp(-0.5 * ((load - places) / 2.0) ** 2)
+        assert one == pytest.approx(np.sqrt(near @ squares / near.sum()))
+    assert found[0] == found[1] > found[2] > found[4] and found[-1] == found[-2]
+    same = error(left_out=4 * [1e-4], identification=4 * [1e-5], verification=4 * [3e-4])
+    assert same == pytest.approx(len(asked) * [3e-4], rel=0.02)
+
+
+@pytest.mark.parametrize('metrics', [
+    by_load((1.0, 7.0), left_out=[8e-4, 2e-4], identification=[1e-5, 1e-5]),
+    {'length': {'left_out': {'rmse': 8e-4}}}])
+def test_two_loads_have_none_between_them_that_could_tell(metrics):
+    found = discrepancy.length_errors(bicep_model(metrics=metrics), np.array([1.0, 4.0, 7.0]))
+    assert found == pytest.approx(3 * [8e-4])
+
+
+def test_the_discrepancy_follows_the_load(problem):
+    """Where the bench was hardly right under a small load, an arm is less certain there."""
+    load = load_history(problem, []).load
+    middle = float(np.median(load))
+    model = dataclasses.replace(problem.model, metrics=by_load(
+        (0.5 * middle, middle, 2.0 * middle), left_out=[9e-4, 1e-4, 1e-4],
+        identification=[9e-4, 1e-5, 1e-4]))
+    problem = problem_for(model, [runs(model)])
+    gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
+    found = np.diag(discrepancy.discrepancy_along(
+        problem, [], problem.simulate([]), Settings()).matrix())
+    error = discrepancy.length_errors(model, load)
+    assert np.ptp(error) > 1e-5
+    assert found == pytest.approx(
+        (error * gain) ** 2 + history.path ** 2 + (gain * history.formation) ** 2)
+
+
 def path_of(model, measured):
     """Return the difference between a load that moves and one that acted all along."""
     return load_history(problem_for(model, [measured]), []).path

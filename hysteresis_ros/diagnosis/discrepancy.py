@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 # The error that differs between the directions of the drive, against the common one.
 DIRECTIONAL = 0.5
+# Of as many loads one lies between others, and tells what the model does between them.
+FEWEST_LOADS = 3
 
 
 @dataclasses.dataclass
@@ -97,6 +99,45 @@ def length_error(model: MuscleModel) -> float:
     return float(error) if error is not None and np.isfinite(error) else 0.0
 
 
+def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
+    """
+    Return the root mean square error of the length [m] that the bench has shown under a load.
+
+    The larger one of that on trials that were not fitted and, from three loads on, that on loads
+    left out of the fit. The lightest and the heaviest one count as fitted: to predict them others
+    are extrapolated, which counts as far beyond them as the next load is away. Errors of few rows
+    are uncertain, so that those of near loads are averaged, with Gaussian weights as wide as loads
+    are apart. With fewer loads or none, it is one number for all.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    load : ndarray, shape (n,)
+        Tension of a muscle [N].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    metrics = model.metrics.get('length', {})
+    held, kept, others = (
+        [np.array(metrics.get(part, {}).get(key, ()), dtype=float)
+         for key in ('loads', 'rmse_by_load')]
+        for part in ('left_out', 'identification', 'verification'))
+    loads, errors = held
+    if len(loads) < FEWEST_LOADS or len(kept[0]) != len(loads):
+        return np.full(len(load), length_error(model))
+    within = np.concatenate((kept[1][:1], errors[1:-1], kept[1][-1:]))
+    if len(others[0]):
+        within = np.maximum(within, np.interp(loads, others[0], others[1]))
+    beyond = [np.maximum(errors[end], within[end]) for end in (0, -1)]
+    places = np.concatenate(([2.0 * loads[0] - loads[1]], loads, [2.0 * loads[-1] - loads[-2]]))
+    squares = np.concatenate((beyond[:1], within, beyond[1:])) ** 2
+    width = float(np.median(np.diff(loads)))
+    near = np.exp(-0.5 * ((np.clip(load, places[0], places[-1])[:, None] - places) / width) ** 2)
+    return np.sqrt(near @ squares / np.sum(near, axis=1))
+
+
 def sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """Return how the angle follows an error of the length [rad/m], shape (n,)."""
     step = 0.01 * problem.model.surroundings.span
@@ -134,7 +175,7 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     direction = np.ones(len(predicted))
     if 'direction' in problem.signals:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
-    bench = gain * (length_error(problem.model) / math.sqrt(1.0 + DIRECTIONAL ** 2))
+    bench = gain * length_errors(problem.model, history.load) / math.sqrt(1.0 + DIRECTIONAL ** 2)
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
     known = FormationMemory.id in {*tried, *(effect.id for effect in effects)}
     formation = np.zeros(len(predicted)) if known else gain * history.formation

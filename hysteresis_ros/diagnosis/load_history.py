@@ -38,16 +38,19 @@ LOADS, ANGLES = 12, 400
 @dataclasses.dataclass(frozen=True)
 class LoadHistory:
     """
-    Differences between models that agree on every table with constant loads.
+    What the load does along an arm's way.
 
     Attributes
     ----------
+    load : ndarray, shape (n,)
+        Tension of each muscle at rest [N].
     path : ndarray, shape (n,)
         What the angle would differ if the present load had acted all along [rad].
     formation : ndarray, shape (n,)
         What the length would differ if martensite kept the strain with which it formed [m].
     """
 
+    load: np.ndarray
     path: np.ndarray
     formation: np.ndarray
 
@@ -80,8 +83,8 @@ def load_history(problem: ArmProblem, effects: Sequence[Effect]) -> LoadHistory:
 
 
 def _ways(problem: ArmProblem, effects: Sequence[Effect]
-          ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Give both differences in the rows that are judged, trial by trial."""
+          ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Give the load and both differences in the rows that are judged, trial by trial."""
     model = problem.model
     chain = Chain(effects, model.surroundings)
     first, stage = model.first_stage(chain), model.require_length_stage(chain)
@@ -95,8 +98,9 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
             first.reset()
             cold = chain.to_drive_squared(model.cold_drive)
             x = first.simulate(np.concatenate(([cold], drive_squared)))
-            felt, width, scale = (_from_cold(np.interp(angle[trial.rows], arm.theta, values))
-                                  for values in (arm.load, arm.width, arm.scale))
+            tension, felt, width, scale = (
+                _from_cold(np.interp(angle[trial.rows], arm.theta, values))
+                for values in (arm.tension, arm.load, arm.width, arm.scale))
             if not first.loaded:
                 felt, width = 0.0 * felt, 0.0 * width
             moving = _held(stage, model.sign * (x - felt), width)
@@ -107,7 +111,8 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
                     for load in loads])
                 path = (arm.angle(loads, still[:, 1:][:, judged])
                         - arm.angle(loads, moving[None, 1:][:, judged]))
-            yield path, (elongations(1.0, moving, scale) - scale * moving)[1:][judged]
+            formation = elongations(1.0, moving, scale) - scale * moving
+            yield tension[1:][judged], path, formation[1:][judged]
 
 
 class _Statics:
@@ -119,7 +124,7 @@ class _Statics:
         statics = Statics.of(geometry, self.theta)
         for effect in chain.mechanism:
             statics = effect.forward(statics, geometry)
-        force = np.maximum(statics.moment, 0.0) / (
+        self.tension = force = np.maximum(statics.moment, 0.0) / (
             geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6))
         # What H2 feels, by how much its loop is wider, and the factor on the strain.
         self.load = chain.load_inside(force)
