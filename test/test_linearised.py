@@ -74,6 +74,20 @@ def test_an_effect_that_is_there_has_the_best_evidence():
     assert max(singles, key=lambda names: singles[names][0])[0] in (NAMES[2], NAMES[7])
 
 
+def test_the_best_few_starts_of_each_effect_are_tried():
+    """One that explains the residual to first order comes before others of its effect."""
+    covariance, starts = make(2, 40)
+    covariance.add(covariance.start(0.4, 2.0))
+    kinds = ['slack', 'payload_error'] * 6
+    starts = [dataclasses.replace(start, effect=catalogue()[name](**{
+        catalogue()[name].parameters[0].name: 0.1 * (1 + number)}))
+        for number, (start, name) in enumerate(zip(starts, kinds))]
+    family = Linearised(covariance.points, starts[6].columns[:, 0], starts)
+    found = family.best_starts()
+    assert sorted(effect.id for effect in found) == ['payload_error'] * 3 + ['slack'] * 3
+    assert next(effect for effect in found if effect.id == 'slack') is starts[6].effect
+
+
 def test_an_effect_makes_no_pair_with_one_that_it_replaces():
     """A lag with two time constants contains that with one."""
     covariance, starts = make(2, 40)

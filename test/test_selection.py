@@ -12,7 +12,7 @@ from scipy import special, stats
 from hysteresis_ros.diagnosis import events
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.diagnosis.discrepancy import sensitivity
+from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, sensitivity
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
@@ -59,6 +59,32 @@ def test_the_planted_effect_is_the_most_probable_answer(payload):
     assert fit.effects[0].values['dm'] == pytest.approx(15.0, abs=2.0)
     assert payload.sufficient(best) and not payload.sufficient(frozenset())
     assert payload.log_posterior(best) > payload.log_posterior(frozenset()) + 5.0
+
+
+def test_what_an_effect_changes_is_as_uncertain_as_its_equation(payload):
+    """By the share `form` with two standard deviations, besides the base model's own error."""
+    fit = payload.fits[frozenset(['payload_error'])]
+    own = discrepancy_along(payload.problem, fit.effects, fit.predicted, payload.settings, TRIED)
+    change = fit.predicted - payload.base.predicted
+    found = np.diag(payload.fitter.discrepancy(fit).matrix())
+    assert found == pytest.approx(
+        np.diag(own.matrix()) + (0.5 * payload.settings.form * change) ** 2)
+    assert np.max(np.abs(change)) > 0.02
+
+
+def test_an_effect_that_contains_another_one_counts_as_both(model):
+    """A lag that is no other when hot is a lag, though its equation can be bent to fit as well."""
+    lag = effect_of(model, 'thermal_lag', time_constant=6.0)
+    clean = runs(model.with_effects([lag]), rows=60, dt=3.0)
+    noise = NOISE * np.random.default_rng(3).standard_normal(clean.rows)
+    found = selection(model, Measurement.from_columns(
+        {**clean.columns, 'angle': clean.column('angle') + noise}), ('thermal_lag', 'heat_loss'))
+    simple, bent = (frozenset([name]) for name in ('thermal_lag', 'heat_loss'))
+    assert found.error(bent) < 1.1 * found.error(simple)
+    assert found.valid()[0] == simple
+    gain = (found.fits[bent].log_evidence - found.fits[simple].log_evidence) / found.temper
+    odds = np.log(found.settings.prior / (1.0 - found.settings.prior))
+    assert found.log_posterior(bent) - found.log_posterior(simple) == pytest.approx(gain + odds)
 
 
 def test_a_larger_set_is_no_answer_where_a_smaller_one_suffices(payload):

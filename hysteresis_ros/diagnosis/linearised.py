@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
     from hysteresis_ros.diagnosis.covariance import Point
 
-# Starts of an effect from which pairs are made.
-PAIRED_STARTS = 3
+# Starts of an effect from which it is fitted, and pairs are made.
+BEST_STARTS = 3
 
 
 @dataclasses.dataclass
@@ -208,6 +208,21 @@ class Linearised:
                 found[start.id,] = (float(value), [start.effect])
         return found
 
+    def _best_starts(self) -> dict[str, list[int]]:
+        """Return the indices of the best few starts of each effect, the best first."""
+        alone = self.evidences(np.arange(len(self.starts))[:, None])
+        found: dict[str, list[int]] = {}
+        for index in np.argsort(-alone, kind='stable'):
+            own = found.setdefault(self.starts[index].id, [])
+            if len(own) < BEST_STARTS:
+                own.append(int(index))
+        return found
+
+    def best_starts(self) -> list[Effect]:
+        """Return the best few starts of each effect."""
+        return [self.starts[index].effect for own in self._best_starts().values()
+                for index in own]
+
     def pairs(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
         """
         Score pairs of effects, from the best few starts of each.
@@ -217,12 +232,7 @@ class Linearised:
         dict of tuple of str to (float, list of Effect)
             By their sorted names the largest log evidence, and the starts that reach it.
         """
-        alone = self.evidences(np.arange(len(self.starts))[:, None])
-        best_starts: dict[str, list[int]] = {}
-        for index in np.argsort(-alone, kind='stable'):
-            own = best_starts.setdefault(self.starts[index].id, [])
-            if len(own) < PAIRED_STARTS:
-                own.append(int(index))
+        best_starts = self._best_starts()
         chosen: list[tuple[int, int]] = []
         for one, other in itertools.combinations(best_starts, 2):
             first, second = (self.starts[best_starts[name][0]].effect for name in (one, other))

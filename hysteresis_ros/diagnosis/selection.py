@@ -101,10 +101,19 @@ class Selection:
         self.p_values: dict[str, float] = {}
 
     def _discrepancy(self, fit: Fit) -> Discrepancy:
-        """Return the discrepancy of the base model where the arm goes with a fit."""
+        """
+        Return the discrepancy of base model and effects where the arm goes with a fit.
+
+        What an effect changes is off by the share by which its equation may be: the size of that
+        share is two standard deviations.
+        """
         effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
-        return discrepancy_along(
+        found = discrepancy_along(
             self.problem, effects, fit.predicted, self.settings, self.names)
+        without = self.fitter.simulate([
+            [one for one in fit.effects if one is not effect] for effect in fit.effects])
+        return dataclasses.replace(found, parts=np.column_stack([
+            found.parts, *(0.5 * self.settings.form * (fit.predicted - without))]))
 
     def run(self) -> None:
         """Score all single effects and pairs, fit the best, and grow sets from them."""
@@ -116,8 +125,14 @@ class Selection:
         self.alone = self._linearised_with(frozenset())
 
     def _fit_alone(self) -> None:
-        """Fit every effect by itself, from the start that scored best."""
-        self._fit([effects for _, effects in self.alone.singles().values()])
+        """
+        Fit every effect by itself, from its best few starts.
+
+        Where a response bends, the start that scores best by linearisation may be the only one from
+        which a fit goes astray.
+        """
+        starts = [[effect] for effect in self.alone.best_starts()]
+        self._begin(starts, len(starts))
         self.p_values = self._significance()
         self._grown.add(frozenset())
         self._refine(1)
@@ -240,15 +255,16 @@ class Selection:
     def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
         """Fit the best sets of those scored."""
         order = sorted(scored.values(), key=lambda item: -item[0])
-        self._begin([effects for _, effects in order[:BEGUN * self.settings.refits]])
+        self._begin([effects for _, effects in order[:BEGUN * self.settings.refits]],
+                    self.settings.refits)
 
-    def _begin(self, sets: Sequence[Sequence[Effect]]) -> None:
+    def _begin(self, sets: Sequence[Sequence[Effect]], most: int) -> None:
         """Fit sets for a few steps, and the best of these to the end, each from one start."""
         begun = self.fitter.fit(sets, self._metric(), FIRST_STEPS, exact=False)
         best: dict[tuple[str, ...], Fit] = {}
         for fit in sorted(begun, key=lambda fit: -fit.log_evidence):
             best.setdefault(fit.names, fit)
-        self._fit([fit.effects for fit in list(best.values())[:self.settings.refits]])
+        self._fit([fit.effects for fit in list(best.values())[:most]])
 
     def _fit_from_all_starts(self, size: int) -> None:
         """
@@ -261,7 +277,7 @@ class Selection:
         for names in probable[:self.settings.refits]:
             starts += itertools.product(*(
                 self._starts_of(effect, self.base) for effect in self.fits[names].effects))
-        self._begin(starts)
+        self._begin(starts, self.settings.refits)
         self._refine(size)
 
     def _exchange(self) -> None:
@@ -353,8 +369,14 @@ class Selection:
         return [names for names in self.ranked() if len(names) == size][:self.settings.beam]
 
     def log_posterior(self, names: frozenset[str]) -> float:
-        """Return the logarithm of a set's posterior probability, but for a constant."""
-        return self.fits[names].log_evidence / self.temper + self._odds * len(names)
+        """
+        Return the logarithm of a set's posterior probability, but for a constant.
+
+        An effect whose equation contains that of another one says that both act.
+        """
+        fit = self.fits[names]
+        acting = len(names) + sum(bool(effect.replaces) for effect in fit.effects)
+        return fit.log_evidence / self.temper + self._odds * acting
 
     def ranked(self) -> list[frozenset[str]]:
         """Return all sets that were fitted, most probable first."""

@@ -33,8 +33,9 @@ class Settings:
     practical : float
         Smallest reduction of the RMSE that matters to a user.
     form : float
-        Share by which an effect's equation may be off: a set whose error is larger than that of
-        another of as few effects by more than this share of the first error is no answer.
+        Share by which an effect's equation may be off, with a probability of 95 %: what an effect
+        changes is as uncertain, and a set whose error is larger than that of another of as few
+        effects by more than this share of the first error is no answer.
     residual_share : float
         Share of the first mean square that one effect may leave beyond the discrepancy.
     coarsening : float
