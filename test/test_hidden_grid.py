@@ -17,7 +17,7 @@ def tool(root):
     """Return the tool, whose folder is on the path only while it is run."""
     sys.path.insert(0, str(root / 'tools'))
     try:
-        yield importlib.import_module('hidden_cases')
+        yield importlib.import_module('hidden_grid')
     finally:
         sys.path.remove(str(root / 'tools'))
 

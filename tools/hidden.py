@@ -14,7 +14,7 @@ import json
 from pathlib import Path
 import sys
 
-from hidden_cases import base_model, cases, FIRST_SEED, run, STRENGTHS
+from hidden_grid import base_model, cases, FIRST_SEED, run, STRENGTHS
 from hidden_scores import FIRST_MUSCLE, print_scores, to_markdown, write, write_page
 from hysteresis_ros.laboratory.plant import MUSCLES
 from hysteresis_ros.workers import delayed, in_parallel

@@ -14,7 +14,7 @@ import dataclasses
 from pathlib import Path
 import sys
 
-from hidden_cases import base_model, Case, cases, FIRST_SEED, run
+from hidden_grid import base_model, Case, cases, FIRST_SEED, run
 from hidden_scores import FIRST_MUSCLE, Row, score
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.laboratory.plant import MUSCLES
@@ -74,7 +74,7 @@ def to_markdown(results: dict[str, list[Row]]) -> str:
     Parameters
     ----------
     results : dict of str to list of dict
-        What `hidden_cases.run` returned for every case, by name of variant; the first one is
+        What `hidden_grid.run` returned for every case, by name of variant; the first one is
         what the others are compared with. Scores that no case counts for are left out.
     """
     scores = {name: {key: value for key, (value, *_) in score(rows).items()}

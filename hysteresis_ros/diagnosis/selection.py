@@ -415,9 +415,9 @@ class Selection:
         return math.sqrt(max(self.error(names) ** 2 - self.fits[names].noise ** 2, 0.0))
 
     def sufficient(self, names: frozenset[str]) -> bool:
-        """Whether a set's residual is no larger than the base model's own error could be."""
-        share = self.settings.residual_share / max(len(names), 1)
-        allowed = self.rmse_95 ** 2 + share * self.noise_free_rmse(frozenset()) ** 2
+        """Whether base model and equations of the effects could be as wrong as a set's residual."""
+        form = self.settings.form * self.noise_free_rmse(frozenset())
+        allowed = self.rmse_95 ** 2 + form ** 2
         return self.noise_free_rmse(names) ** 2 <= allowed
 
     def valid(self) -> list[frozenset[str]]:
