@@ -17,6 +17,9 @@ BINS = {'<50': 0.0, '50-70': 50.0, '70-90': 70.0, '>=90': 90.0}
 # Earlier outputs do not name the muscle.
 FIRST_MUSCLE = 'grains'
 
+# The same to an arm that is at rest in every row: they count as one.
+TWINS = {'supply_sag': 'airflow', 'airflow': 'supply_sag'}
+
 Row = dict[str, Any]
 
 
@@ -29,23 +32,26 @@ def score(results: list[Row]) -> dict[str, tuple]:
     def inside(row):
         return row['truth'][0] in row['reported']
 
+    def first(row):
+        return row['missing'][:1] in (row['truth'], [TWINS.get(row['truth'][0])])
+
     single = [row for row in results if row['group'] in SINGLE]
     sizes = [len(row['reported']) for row in single if row['reported']]
     ratios = [row['unseen'] / row['clean'] for row in single
               if 'unseen' in row and row['truth'][0] in row['missing']]
     return {
-        'truth in the reported set, strong [%]': (*share('strong', inside), 'at least 95'),
-        'truth in the reported set, weak [%]': (*share('weak', inside), 'at least 85'),
+        'truth in the reported set, strong [%]': (*share('strong', inside), 'at least 97'),
+        'truth in the reported set, weak [%]': (*share('weak', inside), 'at least 90'),
         'truth named first, strong [%]': (
-            *share('strong', lambda row: row['missing'][:1] == row['truth']), 'at least 85'),
+            *share('strong', first), 'at least 90'),
         'mean size of the reported set': (
-            float(np.mean(sizes)) if sizes else None, len(sizes), 'at most 2.5'),
+            float(np.mean(sizes)) if sizes else None, len(sizes), 'at most 2.2'),
         'false alarm when nothing is hidden [%]': (
-            *share('none', lambda row: row['verdict'] in ('missing', 'unknown')), 'at most 5'),
+            *share('none', lambda row: row['verdict'] in ('missing', 'unknown')), 'at most 2'),
         'unknown when in no catalogue [%]': (
-            *share('unknown', lambda row: row['verdict'] == 'unknown'), 'at least 80'),
+            *share('unknown', lambda row: row['verdict'] == 'unknown'), 'at least 85'),
         'both of a pair found [%]': (
-            *share('pair', lambda row: set(row['truth']) <= set(row['reported'])), 'at least 75'),
+            *share('pair', lambda row: set(row['truth']) <= set(row['reported'])), 'at least 80'),
         'error on the unseen recording over that without effect, median': (
             float(np.median(ratios)) if ratios else None, len(ratios), 'at most 1.3'),
         'the same, share of cases within 1.3 [%]': (

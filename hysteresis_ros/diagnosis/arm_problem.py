@@ -99,6 +99,10 @@ class ArmProblem(Problem):
             inputs: list[np.ndarray] = []
             base = simulator.run(effects, inputs)
             moved = simulator.run([*effects, Offset(size=step)])
-            areas = np.concatenate([preisach_rows(stage.nodes, u, True) for u in inputs])
-            columns.append((((moved - base) / step)[:, None] * areas)[rows])
+            areas, first = [], 0
+            for u in inputs:
+                own = rows[(rows >= first) & (rows < first + len(u))] - first
+                areas.append(preisach_rows(stage.nodes, u, True)[own])
+                first += len(u)
+            columns.append(((moved - base) / step)[rows, None] * np.concatenate(areas))
         return np.concatenate(columns)
