@@ -5,12 +5,14 @@
 import os
 import subprocess
 import sys
+from typing import NamedTuple
 
 from benchmark.reference import arm_of
 import numpy as np
 import pytest
 
 from hysteresis_ros.kernels import trial
+from hysteresis_ros.kernels.jit import typed
 from hysteresis_ros.kernels.plain import Plain
 from hysteresis_ros.model import Simulator
 from hysteresis_ros.operators import HysteresisOperator
@@ -158,3 +160,21 @@ def test_plain_kernels_are_made_once_and_are_not_compiled():
     assert plain(trial.run) is plain(trial.run)
     assert not hasattr(plain(trial.run), 'py_func')
     assert plain(trial.run).__globals__['step'] is plain(trial.step)
+
+
+class Table(NamedTuple):
+    """A table as kernels take it."""
+
+    values: np.ndarray
+
+
+def test_remembered_types_know_how_an_array_lies_in_memory():
+    numba = pytest.importorskip('numba')
+    typed(Table)
+
+    @numba.njit
+    def corner(table):
+        return table.values[1, 0]
+    values = np.arange(12.0).reshape(3, 4)
+    for way in (values, values.T, values[::2, 1:], values.astype(np.float32)):
+        assert corner(Table(way)) == way[1, 0]

@@ -5,7 +5,7 @@
 from hypothesis import given, strategies
 from hypothesis.extra.numpy import arrays
 from hysteresis_ros.measurements.metrics import (
-    errors, largest_noise, noise_floor, repeat_noise, resolution_noise, sample_noise)
+    errors, largest_noise, noise_floor, repeat_noise, resolution_noise, rmse_by_load, sample_noise)
 from hysteresis_ros.measurements import Measurement
 import numpy as np
 import pytest
@@ -112,3 +112,12 @@ def test_trials_under_other_loads_are_no_repeats():
     measured = table(np.repeat([0, 1], 20), voltage=drive, length=length,
                      force=np.repeat([1.0, 3.0], 20))
     assert repeat_noise([measured]) is None
+
+
+def test_trials_under_the_same_load_are_one():
+    """Which is measured, and so differs a little."""
+    trial = np.repeat([0.0, 1.0, 2.0], 2)
+    found = rmse_by_load(np.array([3.0, -3.0, 4.0, 4.0, 1.0, -1.0]),
+                         np.array([7.0, 7.02, 1.0, 1.0, 7.1, 7.06]), trial)
+    assert found['loads'] == pytest.approx([1.0, 7.045])
+    assert found['rmse_by_load'] == pytest.approx([4.0, np.sqrt(5.0)])

@@ -72,6 +72,15 @@ def test_what_an_effect_changes_is_as_uncertain_as_its_equation(payload):
     assert np.max(np.abs(change)) > 0.02
 
 
+def test_a_set_suffices_as_far_as_model_and_equation_may_be_off(payload, monkeypatch):
+    first, names = 0.2, frozenset(['payload_error'])
+    limit = np.hypot(payload.rmse_95, payload.settings.form * first)
+    for share, enough in ((0.99, True), (1.01, False)):
+        monkeypatch.setattr(payload, 'noise_free_rmse',
+                            lambda one, left=share * limit: left if one else first)
+        assert bool(payload.sufficient(names)) is enough
+
+
 def test_an_effect_that_contains_another_one_counts_as_both(model):
     """A lag that is no other when hot is a lag, though its equation can be bent to fit as well."""
     lag = effect_of(model, 'thermal_lag', time_constant=6.0)
