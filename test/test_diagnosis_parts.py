@@ -209,6 +209,18 @@ def test_the_largest_error_that_the_bench_has_shown_counts():
     assert discrepancy.length_error(bicep_model(metrics={})) == 0.0
 
 
+def test_weight_columns_of_a_trial_do_not_depend_on_the_others():
+    """Each begins with the memory wiped."""
+    model = bicep_model()
+    measured = runs(model, 3)
+    together = problem_for(model, [measured])
+    columns = together.weight_columns([])
+    for trial in range(3):
+        own = problem_for(model, [measured.select([trial])]).weight_columns([])
+        assert np.ptp(own) > 0.0
+        np.testing.assert_allclose(columns[together.trial == trial], own, rtol=1e-6, atol=1e-12)
+
+
 def by_load(loads, **parts):
     """Return metrics of a bench with an error [m] under each load [N], of each part."""
     return {'length': {part: {'rmse': max(errors), 'loads': list(loads), 'rmse_by_load': errors}

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.kernels import trial
-from hysteresis_ros.kernels.jit import typed
+from hysteresis_ros.kernels.jit import remember_types
 from hysteresis_ros.kernels.plain import Plain
 from hysteresis_ros.model import Simulator
 from hysteresis_ros.operators import HysteresisOperator
@@ -170,7 +170,7 @@ class Table(NamedTuple):
 
 def test_remembered_types_know_how_an_array_lies_in_memory():
     numba = pytest.importorskip('numba')
-    typed(Table)
+    remember_types(Table)
 
     @numba.njit
     def corner(table):

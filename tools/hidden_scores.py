@@ -29,11 +29,14 @@ def score(results: list[Row]) -> dict[str, tuple]:
         chosen = [row for row in results if row['group'] == group]
         return (100.0 * sum(map(good, chosen)) / len(chosen) if chosen else None), len(chosen)
 
+    def names(row):
+        return {row['truth'][0], TWINS.get(row['truth'][0], row['truth'][0])}
+
     def inside(row):
-        return row['truth'][0] in row['reported']
+        return bool(names(row).intersection(row['reported']))
 
     def first(row):
-        return row['missing'][:1] in (row['truth'], [TWINS.get(row['truth'][0])])
+        return bool(names(row).intersection(row['missing'][:1]))
 
     single = [row for row in results if row['group'] in SINGLE]
     sizes = [len(row['reported']) for row in single if row['reported']]

@@ -69,8 +69,8 @@ class Fit:
         Response of every row as predicted by a fit to the other folds; empty before
         `cross_validate`.
     covariance : Covariance or None
-        That of the base model's error along the way that the arm takes with these effects; None
-        for the way that it takes without.
+        That of the error of base model and effects along the way that the arm takes with these
+        effects; None for the base model's along the way that it takes without.
     judged : int
         How many covariances at hand were tried with `covariance`.
     """

@@ -3,12 +3,12 @@
 """
 Discrepancy of the base model: how wrong it is by itself, as a covariance of an arm's angles.
 
-It is known before the arm moves. The bench says how large the error of the length is, on trials or
-loads that were held out; on the arm it shows as an error of the angle that is alike at neighbouring
-drives and responses and differs between the directions of the drive. And the bench holds the load
-still, while an arm's load moves with the wire: what a load does in the middle of a transformation
-the bench cannot tell. Models that agree on every bench table bound that (`load_history`); but where
-one of them is an effect that is tried, it speaks for itself.
+It is known before the arm moves. The bench says how large the error of the length is under each
+load, on trials or loads that were held out; on the arm it shows as an error of the angle that is
+alike at neighbouring drives and responses and differs between the directions of the drive. And the
+bench holds the load still, while an arm's load moves with the wire: what a load does in the middle
+of a transformation the bench cannot tell. Models that agree on every bench table bound that
+(`load_history`); but where one of them is an effect that is tried, it speaks for itself.
 """
 
 from __future__ import annotations
@@ -120,16 +120,16 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     ndarray, shape (n,)
     """
     metrics = model.metrics.get('length', {})
-    held, kept, others = (
+    left_out, fitted, verified = (
         [np.array(metrics.get(part, {}).get(key, ()), dtype=float)
          for key in ('loads', 'rmse_by_load')]
         for part in ('left_out', 'identification', 'verification'))
-    loads, errors = held
-    if len(loads) < FEWEST_LOADS or len(kept[0]) != len(loads):
+    loads, errors = left_out
+    if len(loads) < FEWEST_LOADS or len(fitted[0]) != len(loads):
         return np.full(len(load), length_error(model))
-    within = np.concatenate((kept[1][:1], errors[1:-1], kept[1][-1:]))
-    if len(others[0]):
-        within = np.maximum(within, np.interp(loads, others[0], others[1]))
+    within = np.concatenate((fitted[1][:1], errors[1:-1], fitted[1][-1:]))
+    if len(verified[0]):
+        within = np.maximum(within, np.interp(loads, verified[0], verified[1]))
     beyond = [np.maximum(errors[end], within[end]) for end in (0, -1)]
     places = np.concatenate(([2.0 * loads[0] - loads[1]], loads, [2.0 * loads[-1] - loads[-2]]))
     squares = np.concatenate((beyond[:1], within, beyond[1:])) ** 2

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import grid, root
 from .bundle import SEARCH, Wires
-from .jit import typed
+from .jit import remember_types
 from .lean import lean
 
 # Columns of `Arm.grid`: angle [rad], elongation [m], moment to be held [N m], moment arm times
@@ -39,7 +39,7 @@ BUNDLE_SEARCH = REST_SEARCH + root.SIZE
 MOTION = BUNDLE_SEARCH + SEARCH
 
 
-@typed
+@remember_types
 class Arm(NamedTuple):
     """
     Arm and parallel muscles, as tables.
@@ -76,7 +76,7 @@ class Arm(NamedTuple):
     plays: bool
 
 
-@typed
+@remember_types
 class State(NamedTuple):
     """
     What an arm remembers.

@@ -18,7 +18,7 @@ import numpy as np
 
 from . import root
 from .formation import keep, LOAD, parts, SIZE
-from .jit import typed
+from .jit import remember_types
 from .lean import lean
 from .load_play import held
 from .operator import last_input, last_output, peek, step
@@ -32,7 +32,7 @@ SEARCH = root.SIZE + 1
 MOST_EVALUATIONS = 60
 
 
-@typed
+@remember_types
 class Wires(NamedTuple):
     """
     Parallel muscles, each with a memory of its own.

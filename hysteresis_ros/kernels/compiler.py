@@ -23,6 +23,7 @@ except ImportError:     # no POSIX: processes that compile at once are on their 
     fcntl = None        # type: ignore[assignment]
 
 Function = TypeVar('Function', bound=Callable)
+Kind = TypeVar('Kind', bound=type)
 
 _DECORATING = threading.Lock()
 _REPORTED: set[str] = set()
@@ -39,7 +40,7 @@ def compile_and_keep(function: Function) -> Function:
     return compiled
 
 
-def remember_types(kind: type) -> None:
+def remember_types(kind: Kind) -> Kind:
     """
     Have numba remember how it types the tuples of a class; anew in each call takes it 0.2 ms.
 
@@ -47,6 +48,11 @@ def remember_types(kind: type) -> None:
     ----------
     kind : type
         A named tuple of arrays, numbers and such tuples.
+
+    Returns
+    -------
+    type
+        The class.
     """
     known: dict[tuple, Any] = {}
     usual = typeof_impl.dispatch(tuple)
@@ -58,6 +64,7 @@ def remember_types(kind: type) -> None:
         return known[key]
 
     typeof_impl.register(kind, remembered)
+    return kind
 
 
 def _key(value: tuple) -> tuple:

@@ -67,7 +67,8 @@ class MuscleModel:
     mean_load : float
         Mean load of the bench's length table.
     metrics, provenance : dict
-        Errors of the identification, and where the model came from.
+        Errors of the identification (of lengths also `rmse_by_load` [m] at `loads` [N]), and where
+        the model came from.
     """
 
     kind: str
