@@ -343,6 +343,19 @@ def test_equal_muscles_in_parallel_are_one(names):
             assert three.output == pytest.approx(one.output, abs=1e-7)
 
 
+@pytest.mark.parametrize('names, tolerance', [
+    (('inertia',), 0.05), (('inertia', 'series_compliance'), 1e-4),
+    (('viscous_friction', 'series_compliance'), 1e-5)])
+def test_equal_muscles_swing_like_one(names, tolerance):
+    one = balance(*names)
+    model = MODEL.with_effects([*(effect_of(MODEL, name) for name in names), Wires(0., 0., 0.)])
+    three = model.balance(model.chain())
+    three.settle(0.5)
+    both = np.array([[arm.step(x, 0.1) for arm in (one, three)]
+                     for x in np.repeat([3.0, 6.0, 4.0, 7.0, 5.0], 40)])
+    assert np.max(np.abs(np.diff(both))) < tolerance * np.ptp(both[:, 0])
+
+
 @pytest.mark.parametrize('elastic, strain, g', [
     (None, {}, 0.0), (0.3, {}, 0.0), (0.3, {'r': 0.5, 'F0': 0.8, 'growth': 0.1}, 0.0),
     (None, {}, 0.3), (0.3, {'r': 0.5, 'F0': 0.8}, -0.3)])

@@ -62,9 +62,10 @@ def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
         scales = np.interp(even, inside, chain.scale(loads) + 0.0 * loads)
         if plays:
             widths = np.interp(even, inside, chain.loop_width(loads))
-    return (Wires(table, operator.output_range[0], offsets,
-                  chain.compliance() or COMPLIANCE, 1e-10 * (operator.upper - operator.lower),
-                  scales, widths, lightest, spacing, kept), operators, memories)
+    own = chain.compliance()
+    return (Wires(table, operator.output_range[0], offsets, own or COMPLIANCE,
+                  1e-10 * (operator.upper - operator.lower), scales, widths, lightest, spacing,
+                  own > 0.0, kept), operators, memories)
 
 
 def with_own_memories(operators: Sequence[HysteresisOperator]

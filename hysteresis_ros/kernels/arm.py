@@ -38,6 +38,9 @@ REST_SEARCH = NEAR + 5
 BUNDLE_SEARCH = REST_SEARCH + root.SIZE
 MOTION = BUNDLE_SEARCH + SEARCH
 
+# Load that may be missing while the arm moves, over that at rest.
+LOOSER = 1e4
+
 
 @remember_types
 class Arm(NamedTuple):

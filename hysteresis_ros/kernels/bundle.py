@@ -5,13 +5,15 @@ Parallel muscles of unequal length, which share the load as their own memories a
 
 A muscle that lacks dL_i is stretched further than the mean one and bears more. What it bears more
 strains its wire further, and stretches it elastically:
-``S(F_i) (H2[u_i] - L0) + c (F_i - F) = S(F) (H - L0) - dL_i``, with S the factor on the strain
-under a load, c the compliance, F the load of the mean muscle, and H what the transformation gives
-under that load. Where martensite keeps a share of its strain, ``S(F_i) (H2[u_i] - L0)`` is what
+``S(F_i) (H2[u_i] - L0) + c (F_i - F') = S(F) (H - L0) - dL_i``, with S the factor on the strain
+under a load, c the compliance, F the load of the mean muscle at rest, H what the transformation
+gives under that load, and F' the load under which the mean wire is not stretched any further: F,
+or where the wires' own compliance is not known the load of the mean muscle in motion. Where martensite keeps a share of its strain, ``S(F_i) (H2[u_i] - L0)`` is what
 `formation` says instead. u_i follows ``v_i = F_i - x`` with the play that its own load says
 (`load_play`).
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +21,7 @@ import numpy as np
 from . import root
 from .formation import keep, LOAD, parts, SIZE
 from .jit import remember_types
-from .lean import lean
+from .lean import inlined, lean
 from .load_play import held
 from .operator import last_input, last_output, peek, step
 
@@ -41,7 +43,7 @@ class Wires(NamedTuple):
     lengths, `compliance` [m/N] that of a wire, and `tolerance` [N] the load that may be missing.
     `scales` (m,) is the factor on the strain, and `widths` (m,) by how much the loop is wider than
     that of H2, at loads `spacing` [N] apart from `lightest` on, as the transformation feels them.
-    `kept` is the share of the strain that martensite keeps (see `formation`).
+    `elastic` says whether the compliance is the wires' own, not a typical one, and `kept` is the share of the strain that martensite keeps (see `formation`).
     """
 
     table: np.ndarray
@@ -53,16 +55,17 @@ class Wires(NamedTuple):
     widths: np.ndarray
     lightest: float
     spacing: float
+    elastic: bool
     kept: float
 
 
-@lean
+@inlined
 def scale_at(wires: Wires, load: float) -> float:
     """Return the factor on the strain under a load, as the transformation feels it."""
     return _looked_up(wires, wires.scales, load)
 
 
-@lean
+@inlined
 def _looked_up(wires: Wires, values: np.ndarray, load: float) -> float:
     """Return the value of a table (m,) under a load, as the transformation feels it."""
     last = len(values) - 1
@@ -73,47 +76,51 @@ def _looked_up(wires: Wires, values: np.ndarray, load: float) -> float:
     return values[k] + (place - k) * (values[k + 1] - values[k])
 
 
-@lean
+@inlined
 def input_for(wires: Wires, memory: np.ndarray, v: float, x: float) -> float:
     """Return the input of H2 of a muscle with ``v = F - x``."""
     return held(last_input(wires.table, memory), v, _looked_up(wires, wires.widths, v + x))
 
 
-@lean
-def loads_for(wires: Wires, memories: np.ndarray, output: float, load: float, x: float,
-              muscles: np.ndarray) -> None:
+@inlined
+def loads_for(wires: Wires, memories: np.ndarray, output: float, load: float, moving: float,
+              x: float, muscles: np.ndarray) -> None:
     """
     Put each muscle's ``v_i = F_i - x`` for an output under a mean load into `muscles`.
 
-    What is there is where the search begins; the other columns say what martensite keeps.
+    `load` is that of the arm at rest there, and `moving` that of the arm in motion. What is there is where the search begins; the other columns say what martensite keeps.
     """
+    unstretched = load if wires.elastic else moving
     for i in range(len(wires.offsets)):
-        muscles[i, LOAD] = _load_for(wires, memories[i], muscles, i, output, load, x)
+        muscles[i, LOAD] = _load_for(wires, memories[i], muscles, i, output, load, unstretched, x)
 
 
-@lean
+@inlined
 def _load_for(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, output: float,
-              load: float, x: float) -> float:
+              load: float, unstretched: float, x: float) -> float:
     """Return v of one muscle, by stepping outward and then by false position."""
     tolerance = wires.tolerance * wires.compliance
     near = muscles[i, LOAD]
-    here = _excess(wires, memory, muscles, i, near, output, load, x)
+    here = _excess(wires, memory, muscles, i, near, output, load, unstretched, x)
     if abs(here) <= tolerance:
         return near
     # The elastic part alone brings a muscle where it has to be on this way.
     limit = near - here * scale_at(wires, load) / wires.compliance
     stride = -here / TYPICAL_COMPLIANCE
     far, there, count = near, here, 0
-    while here * there > 0.0 and count < MOST_EVALUATIONS:
+    while here * there > 0.0 and abs(there) > tolerance and count < MOST_EVALUATIONS:
         near, here = far, there
         far = near + stride
         far = min(far, limit) if stride > 0.0 else max(far, limit)
-        there = _excess(wires, memory, muscles, i, far, output, load, x)
-        stride *= 2.0
+        there = _excess(wires, memory, muscles, i, far, output, load, unstretched, x)
+        # A little further than the straight line through both says.
+        fall = here - there
+        reach = abs(1.3 * there / fall * (far - near)) if fall * here > 0.0 else math.inf
+        stride = math.copysign(min(max(reach, abs(stride)), 8.0 * abs(stride)), stride)
         count += 1
     while abs(there) > tolerance and there != here and count < MOST_EVALUATIONS:
         point = far - there * (far - near) / (there - here)
-        value = _excess(wires, memory, muscles, i, point, output, load, x)
+        value = _excess(wires, memory, muscles, i, point, output, load, unstretched, x)
         if value * there < 0.0:
             near, here = far, there
         else:
@@ -123,13 +130,13 @@ def _load_for(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, out
     return far
 
 
-@lean
+@inlined
 def _excess(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, v: float,
-            output: float, load: float, x: float) -> float:
+            output: float, load: float, unstretched: float, x: float) -> float:
     """Return how much longer a muscle with a load v + x is than the others let it be [m]."""
     mean, given = scale_at(wires, load), peek(wires.table, memory, input_for(wires, memory, v, x))
     strained, held = parts(wires.kept, muscles, i, given - wires.base)
-    return (scale_at(wires, v + x) * strained + held + wires.compliance * (v + x - load)
+    return (scale_at(wires, v + x) * strained + held + wires.compliance * (v + x - unstretched)
             + wires.offsets[i]) / mean - (output - wires.base)
 
 
@@ -182,13 +189,13 @@ def drive(wires: Wires, memories: np.ndarray, search: np.ndarray, output: float,
           muscles: np.ndarray) -> float:
     """Return the x [N] under which the muscles give `output` [m] and bear `load` [N] each."""
     near = load - mean_input(wires, memories)
-    loads_for(wires, memories, output, load, near, muscles)
+    loads_for(wires, memories, output, load, load, near, muscles)
     here = load - mean_load(muscles, near)
     if abs(here) <= wires.tolerance:
         return near
     x = root.begin(search, 0, near, here, search[GAIN] * here, -np.inf, np.inf, wires.tolerance)
     while root.searching(search, 0):
-        loads_for(wires, memories, output, load, x, muscles)
+        loads_for(wires, memories, output, load, load, x, muscles)
         x = root.proceed(search, 0, load - mean_load(muscles, x))
     keep_gain(search, 0, x - near, 1.0, here)
     return x
@@ -205,13 +212,13 @@ def respond(wires: Wires, memories: np.ndarray, search: np.ndarray, x: float, lo
     of each muscle and what its martensite keeps then go to `following`, shape (muscles, 4).
     """
     output = near = min(max(near, low), high)
-    loads_for(wires, memories, near, load, x, muscles)
+    loads_for(wires, memories, near, load, load, x, muscles)
     here = load - mean_load(muscles, x)
     if abs(here) > wires.tolerance:
         output = root.begin(search, 0, near, here, TYPICAL_COMPLIANCE * search[GAIN] * here, low,
                             high, wires.tolerance)
         while root.searching(search, 0):
-            loads_for(wires, memories, output, load, x, muscles)
+            loads_for(wires, memories, output, load, load, x, muscles)
             output = root.proceed(search, 0, load - mean_load(muscles, x))
         if low < output < high:
             keep_gain(search, 0, output - near, TYPICAL_COMPLIANCE, here)

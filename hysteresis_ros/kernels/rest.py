@@ -12,8 +12,8 @@ import numpy as np
 
 from . import bundle, grid, root
 from .arm import (
-    ANGLE, Arm, BUNDLE_SEARCH, DEMAND, demand_at, factor_at, LINE, LOAD, place, present, required,
-    REST_GAIN, REST_SEARCH, State, width)
+    ANGLE, Arm, BUNDLE_SEARCH, DEMAND, demand_at, factor_at, LINE, LOAD, LOOSER, place, present,
+    required, REST_GAIN, REST_SEARCH, State, width)
 from .formation import keep, LOAD as BEYOND, parts
 from .lean import inlined, lean
 from .operator import last_input, last_output, peek, solve, step
@@ -77,14 +77,15 @@ def settle_bundle(arm: Arm, state: State, line: int, x: float, offset: float, fa
         near = min(max(k - 1 + share, 0.0), float(last))
     point = near
     k, share, here = _lacking_bundle(arm, state, line, point, x, offset, factor, dt)
-    if abs(here) > arm.tolerance:
+    tolerance = arm.tolerance if dt == 0.0 else LOOSER * arm.tolerance
+    if abs(here) > tolerance:
         # Along the grid the muscles give way by about this much.
         column = DEMAND + LINE * line
         scale = bundle.TYPICAL_COMPLIANCE * last / (
             arm.grid[last, column] - arm.grid[0, column])
         point = root.begin(
             motion, BUNDLE_SEARCH, near, here, scale * motion[BUNDLE_SEARCH + bundle.GAIN] * here,
-            0.0, float(last), arm.tolerance)
+            0.0, float(last), tolerance)
         while root.searching(motion, BUNDLE_SEARCH):
             k, share, missing = _lacking_bundle(
                 arm, state, line, point, x, offset, factor, dt)
@@ -95,19 +96,33 @@ def settle_bundle(arm: Arm, state: State, line: int, x: float, offset: float, fa
     return k, share
 
 
-@lean
+@inlined
 def _lacking_bundle(arm: Arm, state: State, line: int, point: float, x: float, offset: float,
                     factor: float, dt: float) -> tuple[int, float, float]:
     """Return the place at a point of the grid, and the load that is missing there."""
     k = min(int(point), len(arm.grid) - 2) + 1
     share = point - (k - 1)
+    load = required(arm, state.motion, line, k, share, dt)
+    return k, share, load - _borne(arm, state, line, k, share, load, x, offset, factor)
+
+
+@lean
+def bundle_load_at(arm: Arm, state: State, x: float, offset: float, factor: float, k: int,
+                   share: float) -> float:
+    """Return the mean load that unequal muscles bear at a place of the arm under a new x."""
+    load = required(arm, state.motion, 0, k, share, 0.0)
+    return _borne(arm, state, 0, k, share, load, x, offset, factor)
+
+
+@inlined
+def _borne(arm: Arm, state: State, line: int, k: int, share: float, load: float, x: float,
+           offset: float, factor: float) -> float:
+    """Return the mean load that unequal muscles bear at a place that asks for a load."""
     output = arm.base + demand_at(arm, line, k, share, offset) / factor
-    load = at_rest = required(arm, state.motion, line, k, share, dt)
-    if arm.wires.kept != 0.0:
-        # What was kept does not strain with the load: the demand is that of the arm at rest.
-        at_rest = required(arm, state.motion, line, k, share, 0.0)
-    bundle.loads_for(arm.wires, state.memories, output, at_rest, x, state.muscles)
-    return k, share, load - bundle.mean_load(state.muscles, x)
+    # The demand is that of the arm at rest.
+    at_rest = required(arm, state.motion, line, k, share, 0.0)
+    bundle.loads_for(arm.wires, state.memories, output, at_rest, load, x, state.muscles)
+    return bundle.mean_load(state.muscles, x)
 
 
 @lean
@@ -142,12 +157,11 @@ def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: 
     edge, part = 1 if drag > 0.0 else 2, abs(drag)
     demand = demand_at(arm, 0, k, share, offset)
     demand += part * (demand_at(arm, edge, k, share, offset) - demand)
-    load = at_rest = _required_held(arm, state, edge, k, share, part, dt)
-    if arm.wires.kept != 0.0:
-        at_rest = _required_held(arm, state, edge, k, share, part, 0.0)
+    load = _required_held(arm, state, edge, k, share, part, dt)
+    at_rest = _required_held(arm, state, edge, k, share, part, 0.0)
     output = arm.base + demand / factor
     if arm.plays or arm.wires.kept != 0.0 or len(arm.wires.offsets) > 1:
-        bundle.loads_for(arm.wires, state.memories, output, at_rest, x, state.muscles)
+        bundle.loads_for(arm.wires, state.memories, output, at_rest, load, x, state.muscles)
     else:
         state.muscles[0, BEYOND] = solve(arm.wires.table, state.memories[0], output)[0]
     return load - bundle.mean_load(state.muscles, x)

@@ -13,18 +13,16 @@ import math
 
 from . import grid, root
 from .arm import (
-    Arm, INSIDE, LENGTH, LEVERAGE, LOOP, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD, REST_SEARCH, SCALE,
-    State, STRETCH, SWING_GAIN, THETA)
+    Arm, INSIDE, LENGTH, LEVERAGE, LOOP, LOOSER, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD,
+    REST_SEARCH, SCALE, State, STRETCH, SWING_GAIN, THETA)
 from .bundle import TYPICAL_COMPLIANCE
 from .formation import keep, parts
-from .lean import lean
+from .lean import inlined, lean
 from .load_play import held
 from .operator import last_input, last_output, peek, step
 
 # Least share of a load that is missing by which the load changes in a dt.
 LEAST_GAIN = 1e-3
-# Load that may be missing, over that at rest.
-LOOSER = 1e4
 # How exactly an elongation [m] is met.
 EXACT = 1e-9
 
@@ -77,9 +75,9 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
 
 
 @lean
-def acceleration_at(arm: Arm, state: State, x: float, offset: float, factor: float, k: int,
-                    share: float, drag: float, grip: float) -> float:
-    """Return the angular acceleration [rad/s^2] of an arm at a place under a new x."""
+def load_at(arm: Arm, state: State, x: float, offset: float, factor: float, k: int, share: float
+            ) -> float:
+    """Return the load that the muscle bears at a place of the arm under a new x."""
     table, memory, motion = arm.wires.table, state.memories[0], state.motion
     wanted = grid.between(arm.grid, LENGTH, k, share)
     u = last_input(table, memory)
@@ -92,11 +90,10 @@ def acceleration_at(arm: Arm, state: State, x: float, offset: float, factor: flo
         while root.searching(motion, REST_SEARCH):
             load, length = _muscle(arm, state, u, x, offset, factor)
             u = root.proceed(motion, REST_SEARCH, wanted - length)
-    leverage = grid.between(arm.grid, LEVERAGE, k, share)
-    return (_needed(arm, k, share, drag, 0.0, grip) - load) * leverage * grip / arm.inertia
+    return load
 
 
-@lean
+@inlined
 def _lacking(arm: Arm, state: State, u: float, x: float, offset: float, factor: float, drag: float,
              slope: float, grip: float) -> tuple[int, float, float]:
     """Return the place where the muscle with the input u is, and the load missing there."""
@@ -109,7 +106,7 @@ def _lacking(arm: Arm, state: State, u: float, x: float, offset: float, factor: 
     return k, share, _needed(arm, k, share, drag, slope, grip) - load
 
 
-@lean
+@inlined
 def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: float
             ) -> tuple[float, float]:
     """Return the load of the muscle that is u beyond x, as it feels it, and its elongation."""
@@ -124,7 +121,7 @@ def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: f
                   + grid.between(arm.loads, STRETCH, n, part) + offset)
 
 
-@lean
+@inlined
 def _load_at(arm: Arm, state: State, u: float, x: float) -> tuple[int, float]:
     """Return the place in the table of loads of the muscle that is u beyond x."""
     n = grid.interval(arm.loads, INSIDE, u + x, int(state.motion[NEAR_LOAD]))
@@ -133,7 +130,7 @@ def _load_at(arm: Arm, state: State, u: float, x: float) -> tuple[int, float]:
         arm.loads[n, INSIDE] - arm.loads[n - 1, INSIDE])
 
 
-@lean
+@inlined
 def _input(arm: Arm, state: State, u: float, x: float) -> float:
     """Return the input of H2 for a load that is u beyond x, as the transformation feels it."""
     if not arm.plays:
@@ -143,14 +140,14 @@ def _input(arm: Arm, state: State, u: float, x: float) -> float:
     return held(last_input(arm.wires.table, state.memories[0]), u, loop)
 
 
-@lean
+@inlined
 def _pull(arm: Arm, k: int, share: float, drag: float, slope: float) -> float:
     """Return the moment that the muscles have to hold at a place where the arm may end."""
     return (grid.between(arm.grid, MOMENT, k, share) - drag
             - slope * grid.between(arm.grid, THETA, k, share))
 
 
-@lean
+@inlined
 def _needed(arm: Arm, k: int, share: float, drag: float, slope: float, grip: float) -> float:
     """Return the load that the arm asks of the muscle there."""
     return _pull(arm, k, share, drag, slope) / (

@@ -15,15 +15,15 @@ import numpy as np
 
 from . import bundle, grid
 from .arm import (
-    ACCELERATION, ANGLE, Arm, BEFORE_DT, BUNDLE_SEARCH, INERTIAL_RATIO, keep_motion, LOAD, NEAR,
-    NEAR_LENGTH, NEAR_LOAD, place, present, REST_GAIN, RINGING, State, SWING_GAIN, THETA, VELOCITY,
-    X)
+    ACCELERATION, ANGLE, Arm, BEFORE_DT, BUNDLE_SEARCH, INERTIAL_RATIO, keep_motion, LEVERAGE, LOAD,
+    MOMENT, NEAR, NEAR_LENGTH, NEAR_LOAD, place, present, REST_GAIN, RINGING, State, SWING_GAIN,
+    THETA, VELOCITY, X)
 from .formation import LOAD as BEYOND, SIZE
 from .jit import jit
 from .lean import lean
 from .operator import last_input, last_output, reset
-from .rest import direction, settle, settle_bundle
-from .swing import acceleration_at, swing
+from .rest import bundle_load_at, direction, settle, settle_bundle
+from .swing import load_at, swing
 
 # A dt longer than this [s] is a settled state to which dynamics contribute nothing.
 LONGEST_TRANSIENT = 5.0
@@ -83,7 +83,7 @@ def step(arm: Arm, state: State, x: float, dt: float, offset: float, factor: flo
     motion[RINGING] = 1.0 if ringing else 0.0
     if ringing:
         pieces = int(math.ceil(dt / arm.longest))
-        if arm.swings and x != motion[X]:
+        if x != motion[X]:
             _kick(arm, state, x, offset, factor)
     motion[X] = x
     angle = motion[ANGLE]
@@ -105,8 +105,13 @@ def _kick(arm: Arm, state: State, x: float, offset: float, factor: float) -> Non
         sense = 0.0 if velocity == 0.0 else math.copysign(1.0, velocity)
         drag = arm.viscous * velocity + sense * arm.coulomb
         k, share = present(arm, motion)
-        motion[ACCELERATION] = acceleration_at(
-            arm, state, x, offset, factor, k, share, drag, math.exp(sense * arm.capstan))
+        if arm.swings:
+            load = load_at(arm, state, x, offset, factor, k, share)
+        else:
+            load = bundle_load_at(arm, state, x, offset, factor, k, share)
+        leverage = grid.between(arm.grid, LEVERAGE, k, share) * math.exp(sense * arm.capstan)
+        motion[ACCELERATION] = (grid.between(arm.grid, MOMENT, k, share) - drag
+                                - load * leverage) / arm.inertia
 
 
 @lean
