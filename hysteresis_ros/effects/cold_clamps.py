@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ends of a heated wire stay cold, because its clamps take their heat."""
 
+import functools
 import math
 
 import numpy as np
@@ -15,6 +16,8 @@ from hysteresis_ros.effects.stages import MaterialEffect
 ALIKE = 6.0
 # Places between the clamp and there: twice as many change less than 1e-4 of a stroke.
 PLACES = 24
+# It takes a ms to compute, and a diagnosis asks for it thousands of times.
+_gauss_legendre = functools.cache(lambda: np.polynomial.legendre.leggauss(PLACES))
 
 
 class ColdClamps(MaterialEffect):
@@ -51,7 +54,7 @@ class ColdClamps(MaterialEffect):
             return None
         half = 1.0 / self.share
         depth = min(half, ALIKE)
-        points, weights = np.polynomial.legendre.leggauss(PLACES)
+        points, weights = _gauss_legendre()
         parts = 0.5 * weights * depth / half
         # Exponentials of negative numbers only: cosh(l / (2 lambda)) would overflow.
         whole = 1.0 + math.exp(-2.0 * half)

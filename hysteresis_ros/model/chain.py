@@ -86,7 +86,8 @@ class Chain:
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Parts of the wire and their excess temperature, each shape (K,); None: all alike."""
-        return next((e.places for e in self.material if e.places is not None), None)
+        found = (effect.places for effect in self.material)
+        return next((places for places in found if places is not None), None)
 
     @property
     def moves(self) -> bool:
