@@ -8,9 +8,9 @@ strains its wire further, and stretches it elastically:
 ``S(F_i) (H2[u_i] - L0) + c (F_i - F') = S(F) (H - L0) - dL_i``, with S the factor on the strain
 under a load, c the compliance, F the load of the mean muscle at rest, H what the transformation
 gives under that load, and F' the load under which the mean wire is not stretched any further: F,
-or where the wires' own compliance is not known the load of the mean muscle in motion. Where martensite keeps a share of its strain, ``S(F_i) (H2[u_i] - L0)`` is what
-`formation` says instead. u_i follows ``v_i = F_i - x`` with the play that its own load says
-(`load_play`).
+or where the wires' own compliance is not known the load of the mean muscle in motion. Where
+martensite keeps a share of its strain, ``S(F_i) (H2[u_i] - L0)`` is what `formation` says instead.
+u_i follows ``v_i = F_i - x`` with the play that its own load says (`load_play`).
 """
 
 import math
@@ -43,7 +43,8 @@ class Wires(NamedTuple):
     lengths, `compliance` [m/N] that of a wire, and `tolerance` [N] the load that may be missing.
     `scales` (m,) is the factor on the strain, and `widths` (m,) by how much the loop is wider than
     that of H2, at loads `spacing` [N] apart from `lightest` on, as the transformation feels them.
-    `elastic` says whether the compliance is the wires' own, not a typical one, and `kept` is the share of the strain that martensite keeps (see `formation`).
+    `elastic` says whether the compliance is the wires' own, not a typical one, and `kept` is the
+    share of the strain that martensite keeps (see `formation`).
     """
 
     table: np.ndarray
@@ -88,7 +89,8 @@ def loads_for(wires: Wires, memories: np.ndarray, output: float, load: float, mo
     """
     Put each muscle's ``v_i = F_i - x`` for an output under a mean load into `muscles`.
 
-    `load` is that of the arm at rest there, and `moving` that of the arm in motion. What is there is where the search begins; the other columns say what martensite keeps.
+    `load` is that of the arm at rest, and `moving` that of the arm in motion. What `muscles` holds
+    is where the search begins; its other columns say what martensite keeps.
     """
     unstretched = load if wires.elastic else moving
     for i in range(len(wires.offsets)):
