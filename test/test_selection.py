@@ -281,6 +281,18 @@ def test_p_values_are_those_of_the_whole_family(model):
     assert among['payload_error'] >= alone['payload_error'] - 0.05
 
 
+@pytest.mark.parametrize('lasting, verdict', [(True, 'adequate'), (False, 'unknown')])
+def test_noise_that_comes_and_goes_has_a_cause(model, lasting, verdict):
+    """Larger than the model's own error: at all times, or in every other ten rows."""
+    clean = recording(model, noise=0.0)
+    noise = np.random.default_rng(2).standard_normal(clean.rows)
+    strength = 1.0 if lasting else np.sqrt(2.0) * (np.arange(clean.rows) // 10 % 2)
+    measured = Measurement.from_columns({
+        **clean.columns, 'angle': clean.column('angle') + 0.1 * strength * noise})
+    told = diagnose(model, [measured], TRIED)
+    assert (told.verdict, told.missing) == (verdict, [])
+
+
 def test_a_planted_effect_has_the_smallest_p_value_that_the_draws_allow(payload):
     """No draw of chance gains as much."""
     assert payload.p_values['payload_error'] == pytest.approx(1.0 / (1 + payload.settings.draws))

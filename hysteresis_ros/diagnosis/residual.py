@@ -68,6 +68,39 @@ def predictable(signals: Mapping[str, np.ndarray], residual: np.ndarray, fold: n
     return float(max(0.0, 1.0 - np.min(errors) / max(total, 1e-300)))
 
 
+def comes_and_goes(residual: np.ndarray, trial: np.ndarray, rng: np.random.Generator,
+                   draws: int) -> float:
+    """
+    Return the p value that a residual is as large at all times, as noise is.
+
+    Residuals of neighbouring rows are as large as each other more often than those of any two: the
+    rank correlation of their sizes, against that of rows in random order (McLeod and Li, J. Time
+    Series Anal. 4 (1983) 269, who take squares, which a single row can decide).
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        In the order in which the rows were recorded.
+    trial : ndarray, shape (n,)
+        Whose rows lie side by side.
+    rng : numpy.random.Generator
+    draws : int
+        Random orders; 1 / (1 + draws) is the smallest p value.
+
+    Returns
+    -------
+    float
+    """
+    ranks = np.argsort(np.argsort(np.abs(residual))) - 0.5 * (len(residual) - 1)
+    neighbours = np.flatnonzero(np.diff(trial) == 0)
+
+    def alike(values: np.ndarray) -> float:
+        return float(values[neighbours] @ values[neighbours + 1])
+
+    by_chance = [alike(rng.permutation(ranks)) for _ in range(draws)]
+    return (1.0 + np.sum(np.array(by_chance) >= alike(ranks))) / (1.0 + draws)
+
+
 def shares(problem: Problem, residual: np.ndarray) -> dict[str, float]:
     """
     Return the share of a residual's mean square that each signal predicts, and 'all' together.

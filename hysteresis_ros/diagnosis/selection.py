@@ -25,6 +25,7 @@ from hysteresis_ros.diagnosis.discrepancy import discrepancy_along
 from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_starts
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.diagnosis.residual import comes_and_goes
 from hysteresis_ros.effects import Effect
 
 if TYPE_CHECKING:
@@ -40,6 +41,9 @@ BEGUN, FIRST_STEPS = 3, 3
 # Of several effects each has to take this share off the first error, to be seen with the others.
 LEAST_SHARE = 0.015
 SIGNIFICANCE = 0.05
+# The same for noise that comes and goes: of noisy recordings each would otherwise be called unknown
+# with that probability.
+NOISE_SIGNIFICANCE = 0.01
 
 
 class Selection:
@@ -93,9 +97,10 @@ class Selection:
         self._refined: set[frozenset[str]] = set()
         self._exchanged: set[frozenset[str]] = set()
         self._least_errors: dict[frozenset[str], float] = {}
-        # Both with the response that they belong to.
+        # Each with the response that it belongs to.
         self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
         self._errors: dict[frozenset[str], tuple[np.ndarray, float]] = {}
+        self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self.rmse_95 = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised
         self.p_values: dict[str, float] = {}
@@ -411,8 +416,26 @@ class Selection:
         return known[1]
 
     def noise_free_rmse(self, names: frozenset[str]) -> float:
-        """Return the root mean square of a set's residual without white noise."""
-        return math.sqrt(max(self.error(names) ** 2 - self.fits[names].noise ** 2, 0.0))
+        """
+        Return the root mean square of a set's residual without white noise.
+
+        What is larger than the base model's own error could be, and comes and goes, is no noise:
+        it has a cause.
+        """
+        noise = self.fits[names].noise
+        if noise > self.rmse_95 and self._noise_p_value(names) <= NOISE_SIGNIFICANCE:
+            noise = 0.0
+        return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
+
+    def _noise_p_value(self, names: frozenset[str]) -> float:
+        """Return the p value that a set's residual is as large at all times."""
+        fit = self.fits[names]
+        known = self._noise_p_values.get(names)
+        if known is None or known[0] is not fit.predicted:
+            p_value = comes_and_goes(self.problem.measured - fit.predicted, self.problem.trial,
+                                     np.random.default_rng(0), self.settings.draws)
+            self._noise_p_values[names] = known = (fit.predicted, p_value)
+        return known[1]
 
     def sufficient(self, names: frozenset[str]) -> bool:
         """Whether base model and equations of the effects could be as wrong as a set's residual."""
