@@ -83,7 +83,7 @@ def step(arm: Arm, state: State, x: float, dt: float, offset: float, factor: flo
     motion[RINGING] = 1.0 if ringing else 0.0
     if ringing:
         pieces = int(math.ceil(dt / arm.longest))
-        if x != motion[X]:
+        if (arm.swings or len(arm.wires.offsets) > 1) and x != motion[X]:
             _kick(arm, state, x, offset, factor)
     motion[X] = x
     angle = motion[ANGLE]
