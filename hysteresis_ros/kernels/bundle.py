@@ -13,7 +13,6 @@ martensite keeps a share of its strain, ``S(F_i) (H2[u_i] - L0)`` is what `forma
 u_i follows ``v_i = F_i - x`` with the play that its own load says (`load_play`).
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -115,10 +114,7 @@ def _load_for(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, out
         far = near + stride
         far = min(far, limit) if stride > 0.0 else max(far, limit)
         there = _excess(wires, memory, muscles, i, far, output, load, unstretched, x)
-        # A little further than the straight line through both says.
-        fall = here - there
-        reach = abs(1.3 * there / fall * (far - near)) if fall * here > 0.0 else math.inf
-        stride = math.copysign(min(max(reach, abs(stride)), 8.0 * abs(stride)), stride)
+        stride = root.outward(near, here, far, there, stride)
         count += 1
     while abs(there) > tolerance and there != here and count < MOST_EVALUATIONS:
         point = far - there * (far - near) / (there - here)

@@ -99,18 +99,32 @@ def proceed(memory: np.ndarray, at: int, value: float) -> float:
     if ended:
         memory[at + _PHASE] = _DONE
         return far
-    # A little further than the straight line through both says.
-    fall = here - value
-    step = abs(memory[at + _STEP])
-    reach = math.inf
-    if fall * here > 0.0:
-        reach = abs(1.3 * value / fall * (far - near))
-    step = math.copysign(min(max(reach, step), 8.0 * step), here)
+    step = outward(near, here, far, value, memory[at + _STEP])
     memory[at + _NEAR], memory[at + _HERE] = far, value
     memory[at + _STEP] = step
     memory[at + _FAR] = min(max(far + step, memory[at + _LOW]), memory[at + _HIGH])
     memory[at + _COUNT] += 1.0
     return memory[at + _FAR]
+
+
+@lean
+def outward(near: float, here: float, far: float, there: float, step: float) -> float:
+    """
+    Return the next step outward, of a function whose sign has not changed yet.
+
+    Parameters
+    ----------
+    near, here : float
+        The last place but one, and the function's value there.
+    far, there : float
+        The last place, and the value there.
+    step : float
+        The last step.
+    """
+    # A little further than the straight line through both says.
+    fall, least = here - there, abs(step)
+    reach = abs(1.3 * there / fall * (far - near)) if fall * here > 0.0 else math.inf
+    return math.copysign(min(max(reach, least), 8.0 * least), step)
 
 
 @lean
