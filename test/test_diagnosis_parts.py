@@ -13,7 +13,7 @@ from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.residual import (
-    comes_and_goes, predictable, shares, unexplained_signal)
+    heteroscedasticity_p_value, predictable, shares, unexplained_signal)
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.significance import (
     block_sums, cosines, gain_interval, paired_p_values, residualise)
@@ -104,13 +104,13 @@ def test_noise_that_comes_and_goes_is_told_from_noise():
     """P values of noise are even between 0 and 1; rows without neighbours say nothing."""
     rng = np.random.default_rng(4)
     trial = np.repeat([0, 1], 60)
-    p_values = np.array([comes_and_goes(rng.standard_normal(120), trial, rng, 99)
+    p_values = np.array([heteroscedasticity_p_value(rng.standard_normal(120), trial, rng, 99)
                          for _ in range(200)])
     assert np.mean(p_values) == pytest.approx(0.5, abs=0.07)
     assert np.mean(p_values <= 0.05) == pytest.approx(0.05, abs=0.05)
     gusts = rng.standard_normal(120) * (1.0 + 4.0 * (np.arange(120) // 10 % 2))
-    assert comes_and_goes(gusts, trial, rng, 399) == 1.0 / 400.0
-    assert comes_and_goes(gusts, np.arange(120), rng, 99) == 1.0
+    assert heteroscedasticity_p_value(gusts, trial, rng, 399) == 1.0 / 400.0
+    assert heteroscedasticity_p_value(gusts, np.arange(120), rng, 99) == 1.0
 
 
 def test_a_residual_names_the_signal_in_which_it_shows(problem):

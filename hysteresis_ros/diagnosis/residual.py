@@ -68,14 +68,14 @@ def predictable(signals: Mapping[str, np.ndarray], residual: np.ndarray, fold: n
     return float(max(0.0, 1.0 - np.min(errors) / max(total, 1e-300)))
 
 
-def comes_and_goes(residual: np.ndarray, trial: np.ndarray, rng: np.random.Generator,
-                   draws: int) -> float:
+def heteroscedasticity_p_value(residual: np.ndarray, trial: np.ndarray,
+                               rng: np.random.Generator, draws: int) -> float:
     """
-    Return the p value that a residual is as large at all times, as noise is.
+    Return the p value of a residual that is not as large at all times, as noise is.
 
-    Residuals of neighbouring rows are as large as each other more often than those of any two: the
-    rank correlation of their sizes, against that of rows in random order (McLeod and Li, J. Time
-    Series Anal. 4 (1983) 269, who take squares, which a single row can decide).
+    Residuals of neighbouring rows are alike in size then: the correlation of the ranks of their
+    sizes, against that of rows in random order (McLeod and Li, J. Time Series Anal. 4 (1983) 269,
+    who take squares, of which a single row can decide).
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ from hysteresis_ros.diagnosis.discrepancy import discrepancy_along
 from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_starts
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
-from hysteresis_ros.diagnosis.residual import comes_and_goes
+from hysteresis_ros.diagnosis.residual import heteroscedasticity_p_value
 from hysteresis_ros.effects import Effect
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ BEGUN, FIRST_STEPS = 3, 3
 # Of several effects each has to take this share off the first error, to be seen with the others.
 LEAST_SHARE = 0.015
 SIGNIFICANCE = 0.05
-# The same for noise that comes and goes: of noisy recordings each would otherwise be called unknown
-# with that probability.
+# The same for noise that is not as large at all times: so many noisy recordings are called unknown
+# by chance.
 NOISE_SIGNIFICANCE = 0.01
 
 
@@ -101,6 +101,8 @@ class Selection:
         self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
         self._errors: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
+        # Of its own, or all other draws would depend on whether this one is needed.
+        self._noise_rng, = rng.spawn(1)
         self.rmse_95 = self.covariance.largest_error(rng, settings.draws)
         self.alone: Linearised
         self.p_values: dict[str, float] = {}
@@ -419,8 +421,8 @@ class Selection:
         """
         Return the root mean square of a set's residual without white noise.
 
-        What is larger than the base model's own error could be, and comes and goes, is no noise:
-        it has a cause.
+        What is larger than the base model's own error could be, and not as large at all times, is
+        no noise: it has a cause.
         """
         noise = self.fits[names].noise
         if noise > self.rmse_95 and self._noise_p_value(names) <= NOISE_SIGNIFICANCE:
@@ -432,8 +434,9 @@ class Selection:
         fit = self.fits[names]
         known = self._noise_p_values.get(names)
         if known is None or known[0] is not fit.predicted:
-            p_value = comes_and_goes(self.problem.measured - fit.predicted, self.problem.trial,
-                                     np.random.default_rng(0), self.settings.draws)
+            p_value = heteroscedasticity_p_value(
+                self.problem.measured - fit.predicted, self.problem.trial, self._noise_rng,
+                self.settings.draws)
             self._noise_p_values[names] = known = (fit.predicted, p_value)
         return known[1]
 
