@@ -19,6 +19,7 @@ import numpy as np
 from hysteresis_ros.effects.base import Effect, Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.stages import DriveEffect
 from hysteresis_ros.kernels.lag import lag
+from hysteresis_ros.kernels.latent import phase_along_branches
 
 
 # A rate [1/s] that stands for one without bound, which times no time would be no number.
@@ -230,6 +231,31 @@ class LatentHeat(FirstOrderLag):
                   ) -> Values:
         """Return the latent heat in units of q; nothing where the phase is not known."""
         heat = np.nan_to_num(self.latent * surroundings.full_drive_squared * (phase - before))
+        return self._share_kept(dt) * heat
+
+    def _share_kept(self, dt: Values) -> Values:
+        """Return the share of the heat released within `dt` [s] that is there at its end."""
         # It comes evenly over the time and is lost to the air as all heat is.
         lost = np.maximum(dt * min(self.rate(True), FASTEST), 1e-12)
-        return -np.expm1(-lost) / lost * heat
+        return -np.expm1(-lost) / lost
+
+    def agreeing_phase(self, phase: np.ndarray, caused: np.ndarray, drive_squared: np.ndarray,
+                       dt: np.ndarray, surroundings: Surroundings) -> np.ndarray:
+        """
+        Return the phase that agrees with the heat it releases, as far as one run shows it.
+
+        Parameters
+        ----------
+        phase, caused : ndarray, shape (rows,)
+            Share of martensite that the effects took in a run, and that the muscle then had.
+        drive_squared, dt : ndarray, shape (rows,)
+            What the muscle felt in this run, and the time since the row before [s].
+        surroundings : Surroundings
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+        """
+        released = self.latent * surroundings.full_drive_squared * self._share_kept(dt)
+        decay = np.exp(-dt * min(self.rate(True), FASTEST))
+        return phase_along_branches(drive_squared, caused, phase, decay, released)

@@ -19,6 +19,7 @@ from hysteresis_ros.effects import (
     catalogue)
 from hysteresis_ros.effects.base import STAGES, Values
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
+from hysteresis_ros.effects.thermal import LatentHeat
 
 # The compliance of no wire of an arm is below this [m/N].
 LEAST_COMPLIANCE = 1e-6
@@ -135,6 +136,11 @@ class Chain:
         for effect in self.thermal:
             signal = effect.forward(signal, inputs, self.surroundings)
         return signal
+
+    @property
+    def latent(self) -> LatentHeat | None:
+        """The effect that makes the phase work against what causes it, if there is one."""
+        return next((one for one in self.thermal if isinstance(one, LatentHeat)), None)
 
     def start(self) -> None:
         """Make the effects with a past forget it."""

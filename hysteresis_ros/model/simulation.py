@@ -18,6 +18,7 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.kernels.formation import elongations
 from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.kernels.thinned import balanced_rows, between
+from hysteresis_ros.model.agreement import Agreement, KnownPhases
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.onset import Past, rows_before, rows_of
@@ -30,11 +31,11 @@ if TYPE_CHECKING:
     from hysteresis_ros.model.muscle import Lifting, MuscleModel
 
 # Effects that depend on the phase are brought into agreement with the phase that they cause in each
-# row, to this share of martensite (rms), in so many passes at most, each looking back at some. An
-# arm in motion has many more rows.
-AGREEMENT, PASSES, MOVING_PASSES, LOOK_BACK = 1e-6, 16, 8, 6
+# row, to this share of martensite (rms), in so many passes at most. An arm in motion has many more
+# rows.
+AGREEMENT, PASSES, MOVING_PASSES = 1e-6, 16, 8
 # Fits compare thousands of sets of effects, and are content with less.
-FIT_AGREEMENT, FIT_PASSES, MOVING_FIT_PASSES = 2e-3, 10, 4
+FIT_AGREEMENT, FIT_PASSES = 2e-3, 5
 # Where all rows count in a fit, an arm at rest is balanced after each change of x by this share of
 # H2's range, and in between is interpolated.
 SPACING = 0.01
@@ -51,10 +52,12 @@ class Response(NamedTuple):
 
     `values` (rows,) is the response, `output` (rows,) that of the operator that transforms; on an
     arm `inputs` (rows,) are those of H2, and `rest` [rad] is the angle before the trial.
+    `drive_squared` (rows,) is what the muscle feels, empty where it is not asked for.
     """
 
     values: np.ndarray
     output: np.ndarray
+    drive_squared: np.ndarray
     inputs: np.ndarray | None = None
     rest: float | None = None
 
@@ -98,10 +101,7 @@ class Simulator:
             self._asked[judged] = True
         self._surroundings = model.surroundings
         self._balances: dict[tuple, ArmBalance] = {}
-        # The martensite share of every row in the latest run of a set of effects, by their names,
-        # and in the latest of all.
-        self._phases: dict[tuple[str, ...], np.ndarray] = {}
-        self._latest = np.ones(measurement.rows)
+        self._phases = KnownPhases(measurement.rows)
         self._statics = None
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
@@ -131,12 +131,9 @@ class Simulator:
             If the model lacks what this kind of measurement needs.
         """
         response, phase = self._run(effects, inputs_of_stage, exact)
-        self._keep(effects, phase)
-        return response
-
-    def _keep(self, effects: Sequence[Effect], phase: np.ndarray | None) -> None:
         if phase is not None:
-            self._phases[tuple(effect.id for effect in effects)] = self._latest = phase
+            self._phases.keep(effects, phase)
+        return response
 
     def _run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None,
              exact: bool = False) -> tuple[np.ndarray, np.ndarray | None]:
@@ -147,10 +144,8 @@ class Simulator:
         result = np.empty(self.measurement.rows)
         phase = None
         if chain.needs_phase:
-            known = self._phases.get(tuple(effect.id for effect in effects), self._latest)
-            found = self._agree(respond, np.ones_like(known) if exact else known,
-                                *self._patience(chain.moves, exact),
-                                together=chain.yields[0] < np.inf)
+            known = self._phases.nearest(effects)
+            found = self._agree(chain, respond, np.ones_like(known) if exact else known, exact)
             phase = known.copy()
             for one in found:
                 phase[one.trial.rows] = one.phase
@@ -219,7 +214,8 @@ class Simulator:
             found = [self._run(effects) for effects in sets]
         # Not before all have run, or the result would depend on who comes first.
         for effects, (_, phase) in zip(sets, found):
-            self._keep(effects, phase)
+            if phase is not None:
+                self._phases.keep(effects, phase)
         return np.array([row for row, _ in found]).reshape(len(sets), self.measurement.rows)
 
     @staticmethod
@@ -227,20 +223,22 @@ class Simulator:
         """Return how many passes are made at most, and the agreement that ends them."""
         if exact:
             return MOVING_PASSES if moves else PASSES, AGREEMENT
-        return MOVING_FIT_PASSES if moves else FIT_PASSES, FIT_AGREEMENT
+        return FIT_PASSES, FIT_AGREEMENT
 
-    def _agree(self, respond: Callable, phase: np.ndarray, passes: int, agreement: float,
-               together: bool = False) -> list[_Agreement]:
+    def _agree(self, chain: Chain, respond: Callable, phase: np.ndarray, exact: bool
+               ) -> list[Agreement]:
         """
         Return each trial with the phase that it has itself, begun with a phase (rows,).
 
-        Where trials depend on those before, they go on `together` until all agree.
+        Where trials depend on those before, they go on together until all agree.
         """
-        found = [_Agreement(trial, phase[trial.rows], agreement) for trial in self.trials]
+        passes, agreement = self._patience(chain.moves, exact)
+        together = chain.yields[0] < np.inf
+        found = [Agreement(trial, phase[trial.rows], agreement) for trial in self.trials]
         searching = found
         for _ in range(passes):
             for one, response in zip(searching, respond([one.driven() for one in searching])):
-                one.take(response, self._phase(response.output))
+                one.take(response, self._phase(response.output), chain)
             still = [one for one in searching if one.searching]
             if not still:
                 break
@@ -256,7 +254,7 @@ class Simulator:
         rows = [(arm.step(drive, Inputs(*inputs)), balance.output, balance.operators[0].input)
                 for drive, *inputs in zip(*columns)]
         angles, outputs, stage_inputs = np.array(rows, dtype=float).reshape(-1, 3).T
-        return Response(angles, outputs, stage_inputs, rest)
+        return Response(angles, outputs, np.array([]), stage_inputs, rest)
 
     def _phase(self, given: np.ndarray) -> np.ndarray:
         """Martensite share as the operator's output shows it."""
@@ -323,11 +321,11 @@ class Simulator:
         return float(x[0]), x[1:], drive_squared
 
     def _force(self, chain: Chain, operator: HysteresisOperator, trial: Trial) -> Response:
-        drive = chain.to_drive(chain.drive_squared(trial.drive, trial.inputs))
+        drive_squared = chain.drive_squared(trial.drive, trial.inputs)
         operator.reset()
         operator.step(self.model.cold_drive)
-        force = operator.simulate(drive)
-        return Response(force, force)
+        force = operator.simulate(chain.to_drive(drive_squared))
+        return Response(force, force, drive_squared)
 
     def _length(self, chain: Chain, first: FirstStage, stage: HysteresisOperator, trial: Trial
                 ) -> Response:
@@ -350,16 +348,18 @@ class Simulator:
                 np.concatenate((scale[:1], scale)))[1:]
         else:
             transformed = scale * factor * (output - base)
-        return Response(base + transformed + chain.stretch(trial.load) + offset, output)
+        return Response(base + transformed + chain.stretch(trial.load) + offset, output,
+                        drive_squared)
 
     def _angles(self, chain: Chain, first: FirstStage, balance: Lifting,
                 asked: np.ndarray | None, trials: Sequence[Trial]) -> list[Response]:
         """Return what the arm does; the trials run in one call of the kernel."""
         # The phase is looked at in all rows, and what martensite keeps is an integral over them.
         spacing = SPACING * balance.span if chain.needs_phase or chain.keeps_strain else np.inf
-        cold, columns, rows = 0.0, [], []
+        cold, columns, rows, felt = 0.0, [], [], []
         for trial in trials:
             cold, x, drive_squared = self._first(chain, first, trial)
+            felt.append(drive_squared)
             columns.append(np.array([
                 x, *chain.drift(trial.drive, drive_squared, trial.inputs), trial.inputs.dt,
                 trial.inputs.clock]))
@@ -379,7 +379,7 @@ class Simulator:
             if rows:
                 angles, outputs, inputs = (between(rows[place], columns[place][0], column)
                                            for column in (angles, outputs, inputs))
-            responses.append(Response(angles, outputs, inputs, angle))
+            responses.append(Response(angles, outputs, felt[place], inputs, angle))
         return responses
 
     def _angles_since(self, past: Past, chain: Chain, first: FirstStage, balance: Lifting,
@@ -393,7 +393,7 @@ class Simulator:
         found = arm.proceed(*(column[since] for column in (
             x, trial.inputs.dt, offset, factor, trial.inputs.clock)))
         angles, outputs, inputs = np.concatenate((past.columns, found), axis=1)
-        return Response(angles, outputs, inputs, past.rest)
+        return Response(angles, outputs, drive_squared, inputs, past.rest)
 
 
 def _beside(clock: np.ndarray, time: float) -> np.ndarray:
@@ -402,52 +402,6 @@ def _beside(clock: np.ndarray, time: float) -> np.ndarray:
     after = int(np.searchsorted(clock, time, 'right'))
     found[max(after - 1, 0):after + 1] = True
     return found
-
-
-class _Agreement:
-    """
-    The phase of one trial on its way to the one that the response to it has.
-
-    Never after one pass alone, whose response would be that of the phase given.
-    """
-
-    response: Response
-
-    def __init__(self, trial: Trial, phase: np.ndarray, agreement: float) -> None:
-        self.trial, self.phase = trial, phase
-        self.searching, self.agrees = True, False
-        self._agreement = agreement
-        self._phases: list[np.ndarray] = []
-        self._residuals: list[np.ndarray] = []
-
-    def driven(self) -> Trial:
-        """Return the trial with the phase to try."""
-        return dataclasses.replace(
-            self.trial, inputs=self.trial.inputs._replace(phase=self.phase))
-
-    def take(self, response: Response, caused: np.ndarray) -> None:
-        """Take the response to the phase, and the phase (rows,) that it has."""
-        self.response, residual = response, caused - self.phase
-        self.searching, self.agrees = True, False
-        if self._phases and np.sqrt(np.mean(residual ** 2)) < self._agreement:
-            self.searching, self.agrees = False, True
-        elif not np.all(np.isfinite(residual)):
-            self.searching = False
-        else:
-            self._phases.append(self.phase)
-            self._residuals.append(residual)
-            self.phase = np.clip(_next_phase(
-                self._phases[-LOOK_BACK:], self._residuals[-LOOK_BACK:]), 0.0, 1.0)
-
-
-def _next_phase(phases: Sequence[np.ndarray], residuals: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the phase to try after some with their residuals, by Anderson's acceleration."""
-    if len(phases) == 1:
-        # What works against its cause would swing to and fro.
-        return phases[0] + 0.5 * residuals[0]
-    steps, changes = np.diff(phases, axis=0).T, np.diff(residuals, axis=0).T
-    parts = np.linalg.lstsq(changes, residuals[-1], rcond=1e-10)[0]
-    return phases[-1] + residuals[-1] - (steps + changes) @ parts
 
 
 def predict(model: MuscleModel, measurement: Measurement) -> np.ndarray:
