@@ -55,9 +55,10 @@ class Start:
         return self.effect.id
 
 
-def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[Start]:
+def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str], point: Point | None = None
+                      ) -> list[Start]:
     """
-    Linearise effects at all their starts, with the effects of a fit fixed.
+    Linearise effects at their starts, with the effects of a fit fixed.
 
     Parameters
     ----------
@@ -66,6 +67,9 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[St
         Its effects keep their values.
     names : sequence of str
         Effects to linearise.
+    point : Point, optional
+        Covariance of the residual. If it is given, effects are linearised at the few starts at
+        which what they change goes best with the residual.
 
     Returns
     -------
@@ -85,6 +89,10 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[St
     walks = [_Moves(start, fit.effects, problem.kind) for start in starts]
     # What is moved a little takes up the phase of where it is moved from.
     responses = fitter.simulate([walk.at for walk in walks])
+    if point is not None:
+        kept = _best_of_each(walks, point.whiten(responses.T - fit.predicted[:, None]),
+                             point.whiten(problem.measured - fit.predicted))
+        walks, responses = [walks[index] for index in kept], responses[kept]
     moved = iter(fitter.simulate([effects for walk in walks for effects in walk.moved]))
     for walk, response in zip(walks, responses):
         given = np.reshape([next(moved) for _ in walk.moved], (-1, len(response)))
@@ -95,6 +103,35 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str]) -> list[St
         found.append(Start(walk.start, response - fit.predicted + jacobian @ (
             mean - walk.vector), jacobian * spread))
     return found
+
+
+def _best_of_each(walks: Sequence[_Moves], changes: np.ndarray, residual: np.ndarray
+                  ) -> list[int]:
+    """
+    Return the indices of the best few starts of each effect.
+
+    Parameters
+    ----------
+    walks : sequence of _Moves
+        One for each start.
+    changes : ndarray, shape (n, len(walks))
+        What each changes in the response, whitened.
+    residual : ndarray, shape (n,)
+        The residual, whitened.
+
+    Returns
+    -------
+    list of int
+        In ascending order.
+    """
+    with np.errstate(all='ignore'):
+        explained = (residual @ changes) ** 2 / np.sum(changes ** 2, axis=0)
+    kept: dict[str, list[int]] = {}
+    for index in np.argsort(-np.nan_to_num(explained), kind='stable').tolist():
+        own = kept.setdefault(walks[index].start.id, [])
+        if len(own) < BEST_STARTS:
+            own.append(index)
+    return sorted(itertools.chain(*kept.values()))
 
 
 class _Moves:

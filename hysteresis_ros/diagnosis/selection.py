@@ -254,10 +254,11 @@ class Selection:
         taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
         others = [name for name in self.names if name not in taken]
         _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
+        own = self.fitter.point(fit) if fit.covariance else None
         return Linearised(
-            [self.fitter.point(fit)] if fit.covariance else self.covariance.points,
+            self.covariance.points if own is None else [own],
             self.problem.measured - fit.predicted,
-            linearised_starts(self.fitter, fit, others), fit.jacobian * spread)
+            linearised_starts(self.fitter, fit, others, own), fit.jacobian * spread)
 
     def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
         """Fit the best sets of those scored."""
