@@ -197,6 +197,7 @@ def test_a_value_outside_its_range_is_warned_of(case, tmp_path):
      ['Also missing: backlash', 'Adding them']),
     ('unknown', {'unexplained': 0.6, 'event': 1234.4}, ['60 %', 'happened at 1234 s']),
     ('unknown', {'unexplained': 0.6, 'signal': 'cycles'}, ['shows in cycles', '60 %']),
+    ('unknown', {'uneven': True}, ['like noise', 'larger at some times']),
     ('unknown', {'resembles': ['end_stop', 'slack']}, ['like end_stop with slack', 'not physical']),
     ('not_excited', {}, ['moves too little']),
     ('adequate', {}, ['no effect of the catalogue'])])

@@ -97,7 +97,7 @@ class _Verdict:
                 kind, missing or resembles, [alternatives[name] for name in missing],
                 unobservable),
             effects=effects, rmse_before=before, rmse_after=after, not_excited=unobservable,
-            event=happened, resembles=resembles,
+            event=happened, resembles=resembles, uneven=unknown and selection.uneven(chosen),
             signal=unexplained_signal(problem, problem.measured - selection.fits[
                 chosen].predicted) if unknown else '')
 

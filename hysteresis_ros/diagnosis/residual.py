@@ -98,7 +98,7 @@ def heteroscedasticity_p_value(residual: np.ndarray, trial: np.ndarray,
         return float(values[neighbours] @ values[neighbours + 1])
 
     by_chance = [alike(rng.permutation(ranks)) for _ in range(draws)]
-    return (1.0 + np.sum(np.array(by_chance) >= alike(ranks))) / (1.0 + draws)
+    return float(1.0 + np.sum(np.array(by_chance) >= alike(ranks))) / (1.0 + draws)
 
 
 def shares(problem: Problem, residual: np.ndarray) -> dict[str, float]:

@@ -425,10 +425,13 @@ class Selection:
         What is larger than the base model's own error could be, and not as large at all times, is
         no noise: it has a cause.
         """
-        noise = self.fits[names].noise
-        if noise > self.rmse_95 and self._noise_p_value(names) <= NOISE_SIGNIFICANCE:
-            noise = 0.0
+        noise = 0.0 if self.uneven(names) else self.fits[names].noise
         return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
+
+    def uneven(self, names: frozenset[str]) -> bool:
+        """Whether what a set leaves looks like noise, but has a cause: see `noise_free_rmse`."""
+        return (self.fits[names].noise > self.rmse_95
+                and self._noise_p_value(names) <= NOISE_SIGNIFICANCE)
 
     def _noise_p_value(self, names: frozenset[str]) -> float:
         """Return the p value that a set's residual is as large at all times."""

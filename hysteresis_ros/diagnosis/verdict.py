@@ -62,6 +62,8 @@ class Diagnosis(Result):
         Time [s] at which something happened that lasts.
     signal : str
         Signal in which an unexplained residual shows.
+    uneven : bool
+        Whether an unexplained residual is like noise, but larger at some times than at others.
     resembles : list of str
         Effects that an unknown one is like; they explain it with implausible values.
     learned : dict or None
@@ -90,6 +92,7 @@ class Diagnosis(Result):
     not_excited: dict[str, str]
     event: float | None
     signal: str
+    uneven: bool = False
     resembles: list[str] = dataclasses.field(default_factory=list)
     learned: dict[str, Any] | None = None
     quantity: str = ''

@@ -55,6 +55,9 @@ def verdict_in_words(found: Diagnosis) -> str:
             text += f' It happened at {found.event:.0f} s and lasts.'
         elif found.signal:
             text += f' It shows in {found.signal}.'
+        elif found.uneven:
+            text += (' It is like noise, but larger at some times than at others: something shakes '
+                     'the arm or disturbs the encoder then.')
         return text
     if found.verdict == 'not_excited':
         return ('Not excited: this recording moves too little to show whether an effect is '
