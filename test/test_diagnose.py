@@ -202,18 +202,6 @@ def test_two_degrees_of_white_noise_on_the_models_own_response_are_adequate(mode
     check_json(found)
 
 
-def test_noise_that_comes_and_goes_has_a_cause(model):
-    """Noise of an encoder is as large at all times: a machine beside the bench is switched on."""
-    train, _ = recordings({})
-    noise = math.radians(6.0) * np.random.default_rng(SEED).standard_normal(train.rows)
-    switched_on = np.arange(train.rows) // 20 % 4 == 1
-    found = diagnose(model, [with_noise(of_the_model(model, train), noise * switched_on)],
-                     seed=SEED)
-    assert (found.verdict, found.missing, found.uneven) == ('unknown', [], True)
-    assert 'larger at some times' in to_text(found, 'angle')
-    check_json(found)
-
-
 @pytest.mark.parametrize('seed', range(3))
 def test_noise_that_is_slow_is_not_taken_for_an_effect(model, seed):
     """One degree that changes from row to row by little: a drift of whatever cause has no name."""

@@ -11,7 +11,7 @@ from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance
 from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
-from hysteresis_ros.diagnosis.linearised import linearised_starts
+from hysteresis_ros.diagnosis.linearised import Linearised, linearised_starts
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of, usual
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.measurements import Measurement
@@ -371,6 +371,30 @@ def test_what_the_bench_says_of_an_effect_is_one_of_its_starts():
         fitter.problem.measured), 0)))
     found = linearised_starts(fitter, base, ['series_compliance', 'payload_error'])
     assert [start.effect.values for start in found if start.id == own.id].count(own.values) == 1
+
+
+@pytest.mark.parametrize('name', ['end_stop', 'overload', 'encoder_eccentricity', 'heat_loss'])
+def test_of_many_starts_the_best_are_linearised_with_other_effects(name):
+    """With the derivatives that they had alone those have the best evidence that do with theirs."""
+    model = bicep_model()
+    payload = effect_of(model, 'payload_error', dm=15.0)
+    fitter = fitter_of(model, noisy(model, [payload, effect_of(model, name)]))
+    point, (base, other) = fitter.covariance.points[0], (
+        fitter.fit([effects], fitter.covariance.points[0])[0] for effects in ([], [payload]))
+    alone = linearised_starts(fitter, base, [name, 'supply_sag'])
+    every = linearised_starts(fitter, other, [name, 'supply_sag'])
+    few = linearised_starts(fitter, other, [name, 'supply_sag'], alone, point)
+    residual = fitter.problem.measured - other.predicted
+    whole, part = (Linearised([point], residual, starts).singles()[name,]
+                   for starts in (every, few))
+    assert whole[1][0].values == part[1][0].values and whole[0] == part[0]
+    usual_ones = [start.values for start in starts_of(effect_of(model, name), 'arm')]
+    assert len(usual_ones) > 3 == sum(start.effect.values in usual_ones for start in few)
+    # What the response suggests is looked at in any case.
+    suggested = [start.effect.values for start in every
+                 if start.id == name and start.effect.values not in usual_ones]
+    assert all(values in [start.effect.values for start in few] for values in suggested)
+    assert sum(start.id == 'supply_sag' for start in few) == 2
 
 
 def test_what_the_response_suggests_is_a_start_in_addition():

@@ -3,6 +3,7 @@
 """Which sets of effects are an answer: on recordings of an arm that the model itself has made."""
 
 import dataclasses
+import json
 
 from model_support import bicep_model, effect_of, runs
 import numpy as np
@@ -290,7 +291,9 @@ def test_noise_that_comes_and_goes_has_a_cause(model, lasting, verdict):
     measured = Measurement.from_columns({
         **clean.columns, 'angle': clean.column('angle') + 0.1 * strength * noise})
     told = diagnose(model, [measured], TRIED)
-    assert (told.verdict, told.missing) == (verdict, [])
+    assert (told.verdict, told.missing, told.uneven) == (verdict, [], not lasting)
+    # As plain types, not numpy's.
+    assert json.loads(json.dumps(told.to_dict()))['uneven'] is not lasting
 
 
 def test_a_planted_effect_has_the_smallest_p_value_that_the_draws_allow(payload):

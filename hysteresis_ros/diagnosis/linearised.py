@@ -10,7 +10,7 @@ covariance at hand (MacKay, Information Theory, ch. 28). It says which sets are 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import dataclasses
 import itertools
 from typing import TYPE_CHECKING
@@ -55,8 +55,8 @@ class Start:
         return self.effect.id
 
 
-def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str], point: Point | None = None
-                      ) -> list[Start]:
+def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
+                      earlier: Sequence[Start] = (), point: Point | None = None) -> list[Start]:
     """
     Linearise effects at their starts, with the effects of a fit fixed.
 
@@ -67,9 +67,11 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str], point: Poi
         Its effects keep their values.
     names : sequence of str
         Effects to linearise.
+    earlier : sequence of Start, optional
+        Starts linearised together with other effects. Of the usual ones of an effect only the
+        few are linearised anew that score best with the derivatives that they had there.
     point : Point, optional
-        Covariance of the residual. If it is given, effects are linearised at the few starts at
-        which what they change goes best with the residual.
+        Covariance of the residual; needed with `earlier`.
 
     Returns
     -------
@@ -78,11 +80,12 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str], point: Poi
     """
     problem, found = fitter.problem, []
     own = {effect.id: effect for effect in fitter.fixed}
-    starts = []
+    starts, usual = [], set()
     for name in names:
         effect = present(problem.model, catalogue()[name])
         starts += starts_of(effect, problem.kind, problem.measured,
                             residual=problem.measured - fit.predicted, clock=problem.own_clock)
+        usual.update(map(_key, starts_of(effect, problem.kind)))
         if name in own:
             # What the bench says of it is as good a start as any.
             starts.append(own[name])
@@ -90,8 +93,11 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str], point: Poi
     # What is moved a little takes up the phase of where it is moved from.
     responses = fitter.simulate([walk.at for walk in walks])
     if point is not None:
-        kept = _best_of_each(walks, point.whiten(responses.T - fit.predicted[:, None]),
-                             point.whiten(problem.measured - fit.predicted))
+        # What the response or the residual suggests is always looked at.
+        known = {_key(start.effect): start.columns for start in earlier
+                 if _key(start.effect) in usual}
+        kept = _promising(walks, responses - fit.predicted, problem.measured - fit.predicted,
+                          known, point)
         walks, responses = [walks[index] for index in kept], responses[kept]
     moved = iter(fitter.simulate([effects for walk in walks for effects in walk.moved]))
     for walk, response in zip(walks, responses):
@@ -105,33 +111,44 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str], point: Poi
     return found
 
 
-def _best_of_each(walks: Sequence[_Moves], changes: np.ndarray, residual: np.ndarray
-                  ) -> list[int]:
+def _promising(walks: Sequence[_Moves], changes: np.ndarray, residual: np.ndarray,
+               known: Mapping[tuple, np.ndarray], point: Point) -> list[int]:
     """
-    Return the indices of the best few starts of each effect.
+    Return the indices of the best few known starts of each effect, and of all others.
 
     Parameters
     ----------
     walks : sequence of _Moves
         One for each start.
-    changes : ndarray, shape (n, len(walks))
-        What each changes in the response, whitened.
+    changes : ndarray, shape (len(walks), n)
+        What each changes in the response.
     residual : ndarray, shape (n,)
-        The residual, whitened.
+    known : mapping of tuple to ndarray of shape (n, k)
+        Derivatives at some starts by their `_key`, in units of the prior's standard deviation.
+    point : Point
+        Covariance of the residual.
 
     Returns
     -------
     list of int
         In ascending order.
     """
-    with np.errstate(all='ignore'):
-        explained = (residual @ changes) ** 2 / np.sum(changes ** 2, axis=0)
-    kept: dict[str, list[int]] = {}
-    for index in np.argsort(-np.nan_to_num(explained), kind='stable').tolist():
-        own = kept.setdefault(walks[index].start.id, [])
-        if len(own) < BEST_STARTS:
-            own.append(index)
-    return sorted(itertools.chain(*kept.values()))
+    places, starts, others = [], [], []
+    for index, (walk, change) in enumerate(zip(walks, changes)):
+        columns = known.get(_key(walk.start))
+        if columns is None:
+            others.append(index)
+        elif np.all(np.isfinite(change)):
+            mean, spread = walk.parameters.prior()
+            places.append(index)
+            starts.append(Start(
+                walk.start, change + columns @ ((mean - walk.vector) / spread), columns))
+    best = Linearised([point], residual, starts).indices_of_best()
+    return sorted([*others, *(places[index] for own in best.values() for index in own)])
+
+
+def _key(effect: Effect) -> tuple:
+    return (effect.id, *effect.values.values())
 
 
 class _Moves:
@@ -245,7 +262,7 @@ class Linearised:
                 found[start.id,] = (float(value), [start.effect])
         return found
 
-    def _best_starts(self) -> dict[str, list[int]]:
+    def indices_of_best(self) -> dict[str, list[int]]:
         """Return the indices of the best few starts of each effect, the best first."""
         alone = self.evidences(np.arange(len(self.starts))[:, None])
         found: dict[str, list[int]] = {}
@@ -257,7 +274,7 @@ class Linearised:
 
     def best_starts(self) -> list[Effect]:
         """Return the best few starts of each effect."""
-        return [self.starts[index].effect for own in self._best_starts().values()
+        return [self.starts[index].effect for own in self.indices_of_best().values()
                 for index in own]
 
     def pairs(self) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
@@ -269,7 +286,7 @@ class Linearised:
         dict of tuple of str to (float, list of Effect)
             By their sorted names the largest log evidence, and the starts that reach it.
         """
-        best_starts = self._best_starts()
+        best_starts = self.indices_of_best()
         chosen: list[tuple[int, int]] = []
         for one, other in itertools.combinations(best_starts, 2):
             first, second = (self.starts[best_starts[name][0]].effect for name in (one, other))

@@ -254,11 +254,14 @@ class Selection:
         taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
         others = [name for name in self.names if name not in taken]
         _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
-        own = self.fitter.point(fit) if fit.covariance else None
-        return Linearised(
-            self.covariance.points if own is None else [own],
-            self.problem.measured - fit.predicted,
-            linearised_starts(self.fitter, fit, others, own), fit.jacobian * spread)
+        residual = self.problem.measured - fit.predicted
+        if not fit.effects:
+            return Linearised(self.covariance.points, residual,
+                              linearised_starts(self.fitter, fit, others))
+        own = self.fitter.point(fit)
+        starts = linearised_starts(self.fitter, fit, others, self.alone.starts, own)
+        return Linearised([own] if fit.covariance else self.covariance.points, residual, starts,
+                          fit.jacobian * spread)
 
     def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
         """Fit the best sets of those scored."""
