@@ -80,7 +80,8 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
     """
     problem, found = fitter.problem, []
     own = {effect.id: effect for effect in fitter.fixed}
-    starts, usual = [], set()
+    starts: list[Effect] = []
+    usual: set[tuple] = set()
     for name in names:
         effect = present(problem.model, catalogue()[name])
         starts += starts_of(effect, problem.kind, problem.measured,

@@ -103,7 +103,10 @@ class Selection:
         self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         # Of its own, or all other draws would depend on whether this one is needed.
         self._noise_rng, = rng.spawn(1)
-        self.rmse_95 = self.covariance.largest_error(rng, settings.draws)
+        # The same draws for all, or chance would decide between two sets.
+        self._seed = int(rng.integers(2 ** 32))
+        self.rmse_95 = self._largest_error(self.covariance)
+        self._largest_errors: dict[frozenset[str], tuple[Covariance, float]] = {}
         self.alone: Linearised
         self.p_values: dict[str, float] = {}
 
@@ -448,10 +451,23 @@ class Selection:
         return known[1]
 
     def sufficient(self, names: frozenset[str]) -> bool:
-        """Whether base model and equations of the effects could be as wrong as a set's residual."""
-        form = self.settings.form * self.noise_free_rmse(frozenset())
-        allowed = self.rmse_95 ** 2 + form ** 2
-        return self.noise_free_rmse(names) ** 2 <= allowed
+        """
+        Whether base model and equations of the effects could be as wrong as a set's residual.
+
+        Along the way that the arm takes with these effects: friction, say, keeps the load from a
+        muscle that cools down, which no load at rest shows.
+        """
+        covariance = self.fits[names].covariance
+        if covariance is None:
+            return self.noise_free_rmse(names) <= self.rmse_95
+        known = self._largest_errors.get(names)
+        if known is None or known[0] is not covariance:
+            self._largest_errors[names] = known = (covariance, self._largest_error(covariance))
+        return self.noise_free_rmse(names) <= known[1]
+
+    def _largest_error(self, covariance: Covariance) -> float:
+        """Return the root mean square that a discrepancy stays below at 95 %."""
+        return covariance.largest_error(np.random.default_rng(self._seed), self.settings.draws)
 
     def valid(self) -> list[frozenset[str]]:
         """

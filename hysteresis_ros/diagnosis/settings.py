@@ -34,9 +34,8 @@ class Settings:
         Smallest reduction of the RMSE that matters to a user.
     form : float
         Share by which an effect's equation may be off, with a probability of 95 %: what an effect
-        changes is as uncertain, a set may leave as large a share of the first error beyond the
-        discrepancy, and one whose error is larger than that of another of as few effects by more
-        than this share is no answer.
+        changes is as uncertain, and a set whose error is larger than that of another of as few
+        effects by more than this share is no answer.
     coarsening : float
         Rows that many rows are worth: neither the discrepancy's covariance nor an effect's equation
         is exact, so that n rows say what n / (1 + n / coarsening) of a true model would, and log
