@@ -54,19 +54,19 @@ def payload(model):
 
 def test_the_planted_effect_is_the_most_probable_answer(payload):
     """With its value, and its residual is no larger than the base model's own error could be."""
-    best = payload.valid()[0]
+    best = payload.sets.valid()[0]
     assert best == {'payload_error'}
-    fit = payload.fits[best]
+    fit = payload.sets.fits[best]
     assert fit.effects[0].values['dm'] == pytest.approx(15.0, abs=2.0)
-    assert payload.sufficient(best) and not payload.sufficient(frozenset())
-    assert payload.log_posterior(best) > payload.log_posterior(frozenset()) + 5.0
+    assert payload.sets.sufficient(best) and not payload.sets.sufficient(frozenset())
+    assert payload.sets.log_posterior(best) > payload.sets.log_posterior(frozenset()) + 5.0
 
 
 def test_what_an_effect_changes_is_as_uncertain_as_its_equation(payload):
     """By the share `form` with two standard deviations, besides the base model's own error."""
-    fit = payload.fits[frozenset(['payload_error'])]
+    fit = payload.sets.fits[frozenset(['payload_error'])]
     own = discrepancy_along(payload.problem, fit.effects, fit.predicted, payload.settings, TRIED)
-    change = fit.predicted - payload.base.predicted
+    change = fit.predicted - payload.sets.base.predicted
     found = np.diag(payload.fitter.discrepancy(fit).matrix())
     assert found == pytest.approx(
         np.diag(own.matrix()) + (0.5 * payload.settings.form * change) ** 2)
@@ -76,22 +76,22 @@ def test_what_an_effect_changes_is_as_uncertain_as_its_equation(payload):
 def test_a_set_suffices_as_far_as_model_and_equation_may_be_off(payload, monkeypatch):
     """Along the way that the arm takes with the set: 95 % of draws of that error are smaller."""
     names = frozenset(['payload_error'])
-    matrix = payload.fitter.discrepancy(payload.fits[names]).matrix()
+    matrix = payload.fitter.discrepancy(payload.sets.fits[names]).matrix()
     rng = np.random.default_rng(8)
     draws = rng.multivariate_normal(np.zeros(len(matrix)), matrix, 4000, method='eigh')
     sizes = np.sqrt(np.mean(draws ** 2, axis=1)) * np.exp(
         payload.settings.scale_spread * rng.standard_normal(4000))
     limit = np.quantile(sizes, 0.95)
     for share, enough in ((0.9, True), (1.1, False)):
-        monkeypatch.setattr(payload, 'noise_free_rmse', lambda one, left=share * limit: left)
-        assert bool(payload.sufficient(names)) is enough
+        monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda one, left=share * limit: left)
+        assert bool(payload.sets.sufficient(names)) is enough
 
 
 def test_a_set_without_effects_suffices_as_far_as_the_model_may_be_off(payload, monkeypatch):
     for share, enough in ((0.99, True), (1.01, False)):
-        monkeypatch.setattr(payload, 'noise_free_rmse',
-                            lambda one, left=share * payload.rmse_95: left)
-        assert bool(payload.sufficient(frozenset())) is enough
+        monkeypatch.setattr(payload.sets, 'noise_free_rmse',
+                            lambda one, left=share * payload.sets.rmse_95: left)
+        assert bool(payload.sets.sufficient(frozenset())) is enough
 
 
 def test_an_effect_that_contains_another_one_counts_as_both(model):
@@ -102,31 +102,32 @@ def test_an_effect_that_contains_another_one_counts_as_both(model):
     found = selection(model, Measurement.from_columns(
         {**clean.columns, 'angle': clean.column('angle') + noise}), ('thermal_lag', 'heat_loss'))
     simple, bent = (frozenset([name]) for name in ('thermal_lag', 'heat_loss'))
-    assert found.error(bent) < 1.1 * found.error(simple)
-    assert found.valid()[0] == simple
-    gain = (found.fits[bent].log_evidence - found.fits[simple].log_evidence) / found.temper
+    assert found.sets.error(bent) < 1.1 * found.sets.error(simple)
+    assert found.sets.valid()[0] == simple
+    sets = found.sets
+    gain = (sets.fits[bent].log_evidence - sets.fits[simple].log_evidence) / sets.temper
     odds = np.log(found.settings.prior / (1.0 - found.settings.prior))
-    assert found.log_posterior(bent) - found.log_posterior(simple) == pytest.approx(gain + odds)
+    assert sets.log_posterior(bent) - sets.log_posterior(simple) == pytest.approx(gain + odds)
 
 
 def test_a_larger_set_is_no_answer_where_a_smaller_one_suffices(payload):
     """Each of its effects would have to matter, and beside the planted one nothing does."""
     payload.grow(frozenset(['payload_error']))
-    larger = [names for names in payload.fits if len(names) > 1 and 'payload_error' in names]
+    larger = [names for names in payload.sets.fits if len(names) > 1 and 'payload_error' in names]
     assert larger
-    assert not set(larger) & set(payload.valid())
+    assert not set(larger) & set(payload.sets.valid())
 
 
 def test_a_smaller_set_that_is_implausible_would_not_do(payload, monkeypatch):
     """It can be no answer itself, so that a larger one with it may be."""
     payload.grow(frozenset(['payload_error']))
     small = frozenset(['payload_error'])
-    larger = next(names for names in payload.fits if small < names)
-    assert payload._would_do(small, larger)
-    fit = payload.fits[small]
+    larger = next(names for names in payload.sets.fits if small < names)
+    assert payload.sets._would_do(small, larger)
+    fit = payload.sets.fits[small]
     too_heavy = fit.effects[0].with_values(dm=400.0)
-    monkeypatch.setitem(payload.fits, small, dataclasses.replace(fit, effects=[too_heavy]))
-    assert payload.fits[small].implausible() and not payload._would_do(small, larger)
+    monkeypatch.setitem(payload.sets.fits, small, dataclasses.replace(fit, effects=[too_heavy]))
+    assert payload.sets.fits[small].implausible() and not payload.sets._would_do(small, larger)
 
 
 def test_a_larger_set_may_be_the_answer_where_only_it_leaves_no_more_than_the_models_own_error(
@@ -134,15 +135,15 @@ def test_a_larger_set_may_be_the_answer_where_only_it_leaves_no_more_than_the_mo
     """However much more probable it is; where both do, it has to be clearly more probable."""
     payload.grow(frozenset(['payload_error']))
     small = frozenset(['payload_error'])
-    larger = next(names for names in payload.fits if small < names)
-    least = payload.log_posterior(small)
-    monkeypatch.setitem(payload._largest_errors, small,
-                        (payload.fits[small].covariance, 1.5 * payload.rmse_95))
+    larger = next(names for names in payload.sets.fits if small < names)
+    least = payload.sets.log_posterior(small)
+    monkeypatch.setitem(payload.sets._largest_errors, small,
+                        (payload.sets.fits[small].covariance, 1.5 * payload.sets.rmse_95))
     for odds, small_error, would_do in ((0.1, 1.2, False), (0.1, 0.9, True), (-0.1, 1.2, True)):
-        errors = {small: small_error * payload.rmse_95, larger: 0.8 * payload.rmse_95}
-        monkeypatch.setattr(payload, 'noise_free_rmse', lambda names: errors.get(names, 1.0))
-        monkeypatch.setattr(payload, 'log_posterior', {small: least, larger: least + odds}.get)
-        assert payload._would_do(small, larger) == would_do
+        errors = {small: small_error * payload.sets.rmse_95, larger: 0.8 * payload.sets.rmse_95}
+        monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: errors.get(names, 1.0))
+        monkeypatch.setattr(payload.sets, 'log_posterior', {small: least, larger: least + odds}.get)
+        assert payload.sets._would_do(small, larger) == would_do
 
 
 def two_effects(model):
@@ -157,10 +158,10 @@ def test_two_effects_are_found_as_a_pair_where_neither_suffices():
     found = selection(model, recording(model, [
         effect_of(model, 'payload_error', dm=-15.0), effect_of(model, 'supply_sag', Rs=0.8)]))
     planted = frozenset(['payload_error', 'supply_sag'])
-    assert found.valid()[0] == planted
-    assert found.sufficient(planted)
+    assert found.sets.valid()[0] == planted
+    assert found.sets.sufficient(planted)
     for name in planted:
-        assert not found.sufficient(frozenset([name]))
+        assert not found.sets.sufficient(frozenset([name]))
 
 
 def test_two_effects_behind_one_are_found_as_a_pair(model):
@@ -180,7 +181,7 @@ def test_sets_are_fitted_in_the_units_that_they_are_judged_by(hidden, judged):
     effects = [effect_of(model, name, **values) for name, values in hidden.items()]
     found = selection(model, recording(model, effects),
                       [*TRIED, 'airflow', 'pwm_dead_zone', 'end_stop'])
-    for names, fit in found.fits.items():
+    for names, fit in found.sets.fits.items():
         if judged is None or names == {judged}:
             assert found.fitter.polished(fit).log_evidence < fit.log_evidence + 1.0, names
 
@@ -192,13 +193,13 @@ def test_a_pair_that_is_stuck_is_fitted_from_all_starts(monkeypatch):
     measured = recording(model, [effect_of(model, 'payload_error', dm=-15.0),
                                  effect_of(model, 'supply_sag', Rs=0.8)])
     found = selection(model, measured)
-    good = found.fits[names]
+    good = found.sets.fits[names]
     stuck, = found.fitter.fit([[effect.with_values(**dict.fromkeys(effect.values, 1e-3))
                                 for effect in good.effects]], found._metric(), 0)
     assert stuck.log_evidence < good.log_evidence - 20.0
-    monkeypatch.setitem(found.fits, names, stuck)
+    monkeypatch.setitem(found.sets.fits, names, stuck)
     found._fit_from_all_starts(2)
-    assert found.fits[names].log_evidence > good.log_evidence - 1.0
+    assert found.sets.fits[names].log_evidence > good.log_evidence - 1.0
 
 
 @pytest.mark.parametrize('change, tried', [(0.0, []), (0.2, [2])])
@@ -219,12 +220,12 @@ def test_what_suffices_alone_grows_alone(payload, monkeypatch):
     monkeypatch.setattr(payload.covariance, 'size', 0.0)
     assert payload._worth_growing(1) == payload._ranked_of(1)
     assert payload._worth_growing(2) == []
-    monkeypatch.setattr(payload, 'valid', lambda: [pair, small])
-    monkeypatch.setitem(payload.fits, pair, payload.fits[small])
+    monkeypatch.setattr(payload.sets, 'valid', lambda: [pair, small])
+    monkeypatch.setitem(payload.sets.fits, pair, payload.sets.fits[small])
     assert payload._worth_growing(2) == [pair]
     monkeypatch.setattr(payload, '_promising', lambda names: False)
     assert payload._worth_growing(2) == []
-    monkeypatch.setattr(payload, 'noise_free_rmse', lambda names: 2.0 * payload.rmse_95)
+    monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: 2.0 * payload.sets.rmse_95)
     assert payload._worth_growing(2) == payload._ranked_of(2)
 
 
@@ -237,15 +238,15 @@ def without_the_planted_pair():
     found = selection(model, recording(model, [
         effect_of(model, 'payload_error', dm=-15.0), effect_of(model, 'supply_sag', Rs=0.8)]),
         [*TRIED, 'airflow'])
-    return found, found.fits.pop(PLANTED).log_evidence
+    return found, found.sets.fits.pop(PLANTED).log_evidence
 
 
 def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
     """A fan is a sag to an arm at rest; in its place the sag itself is found."""
     found, before = without_the_planted_pair()
-    assert found.valid()[0] == {'airflow', 'payload_error'}
+    assert found.sets.valid()[0] == {'airflow', 'payload_error'}
     found._exchange()
-    assert found.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
+    assert found.sets.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
 
 
 def test_what_is_not_physical_is_exchanged_for_what_it_stands_for(monkeypatch):
@@ -255,8 +256,8 @@ def test_what_is_not_physical_is_exchanged_for_what_it_stands_for(monkeypatch):
                         lambda fit: ['airflow.beta'] if 'airflow' in fit.names else [])
     assert found._to_exchange() == ({'airflow', 'payload_error'}, ['airflow'])
     found._exchange()
-    assert found.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
-    assert found.valid()[0] == PLANTED
+    assert found.sets.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
+    assert found.sets.valid()[0] == PLANTED
 
 
 def test_an_effect_has_to_matter_by_a_practical_size(model):
@@ -264,11 +265,11 @@ def test_an_effect_has_to_matter_by_a_practical_size(model):
     measured = recording(model, [effect_of(model, 'payload_error', dm=15.0)], noise=0.02)
     found = selection(model, measured, ('payload_error',))
     planted = frozenset(['payload_error'])
-    assert planted in found.valid()
-    gain = 1.0 - found.error(planted) / found.error(frozenset())
+    assert planted in found.sets.valid()
+    gain = 1.0 - found.sets.error(planted) / found.sets.error(frozenset())
     assert 0.1 < gain < 0.99
-    found.settings = dataclasses.replace(found.settings, practical=gain + 0.01)
-    assert planted not in found.valid()
+    found.sets.settings = dataclasses.replace(found.settings, practical=gain + 0.01)
+    assert planted not in found.sets.valid()
 
 
 def test_an_implausible_set_is_no_answer_however_well_it_explains(model):
@@ -277,10 +278,10 @@ def test_an_implausible_set_is_no_answer_however_well_it_explains(model):
     high = next(p for p in far.parameters if p.name == 'dm').high
     measured = recording(model, [effect_of(model, 'payload_error', dm=1.5 * high)])
     found = selection(model, measured, ('payload_error',))
-    fit = found.fits[frozenset(['payload_error'])]
+    fit = found.sets.fits[frozenset(['payload_error'])]
     assert fit.implausible() == ['payload_error.dm']
-    assert found.error(frozenset(['payload_error'])) < 0.3 * found.error(frozenset())
-    assert found.valid() == [frozenset()]
+    assert found.sets.error(frozenset(['payload_error'])) < 0.3 * found.sets.error(frozenset())
+    assert found.sets.valid() == [frozenset()]
     told = diagnose(model, [measured], ['payload_error'])
     assert (told.verdict, told.missing) == ('unknown', [])
     assert told.resembles == ['payload_error']
@@ -289,7 +290,7 @@ def test_an_implausible_set_is_no_answer_however_well_it_explains(model):
 def test_p_values_are_those_of_the_whole_family(model):
     """The more effects could have been named by chance, the less is a gain worth."""
     measured = recording(model, noise=0.035)
-    alone, among = (selection(model, measured, names).p_values for names in (
+    alone, among = (selection(model, measured, names).sets.p_values for names in (
         ('payload_error',), TRIED))
     assert set(among) == set(TRIED)
     assert min(among.values()) > 0.05
@@ -312,13 +313,14 @@ def test_noise_that_comes_and_goes_has_a_cause(model, lasting, verdict):
 
 def test_a_planted_effect_has_the_smallest_p_value_that_the_draws_allow(payload):
     """No draw of chance gains as much."""
-    assert payload.p_values['payload_error'] == pytest.approx(1.0 / (1 + payload.settings.draws))
+    assert payload.sets.p_values['payload_error'] == pytest.approx(
+        1.0 / (1 + payload.settings.draws))
 
 
 def test_the_same_seed_gives_the_same_p_values(model):
     """And another one others, or nothing would be drawn."""
     measured = recording(model, noise=0.035)
-    first, again, other = (selection(model, measured, TRIED[:2], seed).p_values
+    first, again, other = (selection(model, measured, TRIED[:2], seed).sets.p_values
                            for seed in (1, 1, 2))
     assert first == again
     assert first != other
@@ -337,9 +339,9 @@ def test_a_recording_that_shows_none_of_the_effects_asked_for_is_judged(model):
 def test_noise_is_no_evidence_for_any_effect(model):
     """Two degrees of white noise, and no set is an answer; the model itself suffices."""
     found = selection(model, recording(model, noise=0.035))
-    assert found.valid() == [frozenset()]
-    assert found.ranked()[0] == frozenset()
-    assert found.base.noise == pytest.approx(0.035, rel=0.2)
+    assert found.sets.valid() == [frozenset()]
+    assert found.sets.ranked()[0] == frozenset()
+    assert found.sets.base.noise == pytest.approx(0.035, rel=0.2)
 
 
 def test_something_that_happened_once_has_its_time(model):
@@ -350,7 +352,7 @@ def test_something_that_happened_once_has_its_time(model):
     found = selection(model, measured, ('payload_error', 'supply_sag'))
     time, log_posterior = events.most_probable(found.problem, found)
     assert abs(time - found.problem.clock[row]) <= 60.0
-    best = max((found.log_posterior(names) for names in found.valid()), default=-np.inf)
+    best = max((found.sets.log_posterior(names) for names in found.sets.valid()), default=-np.inf)
     assert log_posterior > best
     told = diagnose(model, [measured], ['payload_error', 'supply_sag'])
     assert (told.verdict, told.missing, told.event) == ('unknown', [], time)
@@ -364,7 +366,7 @@ def test_an_event_has_the_evidence_of_a_column_of_unknown_size(model, of_length)
     shape = gain / np.sqrt(np.mean(gain ** 2)) if of_length else np.ones(90)
     found = selection(model, recording(model, change=0.1 * shape * (np.arange(90) >= row)), ())
     problem, rows = found.problem, 90 - 2 * int(events.MARGIN * 90)
-    residual = problem.measured - found.base.predicted
+    residual = problem.measured - found.sets.base.predicted
     moment, total = events.most_probable(problem, found)
     assert moment == problem.clock[row]
     best, spread = -np.inf, np.sqrt(np.mean(residual ** 2))
@@ -376,7 +378,7 @@ def test_an_event_has_the_evidence_of_a_column_of_unknown_size(model, of_length)
                 whitened[:, :1] - whitened[:, 1:] * sizes)
             best = max(best, special.logsumexp(density) + np.log(sizes[1] - sizes[0]))
     odds = np.log(found.settings.prior / (1.0 - found.settings.prior))
-    assert total == pytest.approx(best / found.temper + odds - np.log(2 * rows), abs=0.3)
+    assert total == pytest.approx(best / found.sets.temper + odds - np.log(2 * rows), abs=0.3)
 
 
 def test_an_event_has_to_explain_more_than_the_base_models_own_error():

@@ -64,14 +64,14 @@ class _Verdict:
     """What follows from a selection."""
 
     def __init__(self, selection: Selection) -> None:
-        self.selection = selection
+        self.selection, self.sets = selection, selection.sets
         self.problem, self.fitter = selection.problem, selection.fitter
         self.settings = selection.settings
 
     def sum_up(self) -> verdict.Diagnosis:
         """Judge the residual, and put all together."""
         selection, problem = self.selection, self.problem
-        valid = selection.valid()
+        valid = self.sets.valid()
         event, event_log = events.most_probable(problem, selection)
         shares = self._probabilities(valid, event_log)
         unknown = shares.pop('unknown') > 0.5
@@ -81,34 +81,34 @@ class _Verdict:
         resembles = self._resembles(best) if unknown else []
         kind = 'unknown' if unknown else self._known(chosen, unobservable)
         alternatives = self._alternatives(chosen, valid)
-        fits = self.fitter.cross_validate([selection.base, selection.fits[chosen]])
+        fits = self.fitter.cross_validate([self.sets.base, self.sets.fits[chosen]])
         before, after = (self.fitter.error(fit.held_out) for fit in fits)
-        effects = self._in_order(self.fitter.with_intervals(selection.fits[chosen]))
+        effects = self._in_order(self.fitter.with_intervals(self.sets.fits[chosen]))
         missing = [effect.id for effect in effects]
         happened = event if unknown and event_log > self._log_mass(valid) else None
         return verdict.Diagnosis(
             verdict=kind, missing=missing,
             alternatives=[alternatives[name] for name in missing],
             ranking=self._ranking(missing, before), sets=self._sets(shares, unknown),
-            noise_floor=selection.fits[chosen].noise,
+            noise_floor=self.sets.fits[chosen].noise,
             structural_error=selection.covariance.size,
             unexplained=self._unexplained(chosen),
             experiment=verdict.next_experiment(
                 kind, missing or resembles, [alternatives[name] for name in missing],
                 unobservable),
             effects=effects, rmse_before=before, rmse_after=after, not_excited=unobservable,
-            event=happened, resembles=resembles, uneven=unknown and selection.uneven(chosen),
-            signal=unexplained_signal(problem, problem.measured - selection.fits[
+            event=happened, resembles=resembles, uneven=unknown and self.sets.uneven(chosen),
+            signal=unexplained_signal(problem, problem.measured - self.sets.fits[
                 chosen].predicted) if unknown else '')
 
     def _in_order(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return effects, that first which explains most by itself."""
         def alone(effect: Effect) -> float:
-            return self.selection.error(frozenset([effect.id]))
+            return self.sets.error(frozenset([effect.id]))
         return sorted(effects, key=alone)
 
     def _log_mass(self, valid: Iterable[frozenset[str]]) -> float:
-        return max((self.selection.log_posterior(names) for names in valid), default=-np.inf)
+        return max((self.sets.log_posterior(names) for names in valid), default=-np.inf)
 
     def _probabilities(self, valid: Sequence[frozenset[str]], event_log: float
                        ) -> dict[Any, float]:
@@ -116,10 +116,10 @@ class _Verdict:
         # What does not suffice needs one cause more, as improbable as any other effect. Drift and
         # discrepancy stand for that cause, and are no evidence against a set that does suffice.
         further = math.log(self.settings.prior / (1.0 - self.settings.prior))
-        logs = {names: self.selection.log_posterior(names) for names in valid}
-        most = max((logs[names] for names in valid if self.selection.sufficient(names)),
+        logs = {names: self.sets.log_posterior(names) for names in valid}
+        most = max((logs[names] for names in valid if self.sets.sufficient(names)),
                    default=np.inf)
-        weights = {names: (value if self.selection.sufficient(names)
+        weights = {names: (value if self.sets.sufficient(names)
                            else min(value, most) + further)
                    for names, value in logs.items()}
         top = max([event_log, *weights.values()])
@@ -127,7 +127,7 @@ class _Verdict:
         unknown = math.exp(event_log - top)
         known = {}
         for names, value in mass.items():
-            if self.selection.sufficient(names):
+            if self.sets.sufficient(names):
                 known[names] = value
             else:
                 unknown += value
@@ -138,11 +138,11 @@ class _Verdict:
     def _sets(self, shares: dict[frozenset[str], float], unknown: bool) -> list[dict[str, Any]]:
         rows: list[dict[str, Any]] = [
             {'effects': sorted(names), 'probability': float(share),
-             'rmse': self.selection.error(names)}
+             'rmse': self.sets.error(names)}
             for names, share in shares.items() if share >= 1e-3]
         rest = 1.0 - sum(row['probability'] for row in rows)
         rows.append({'effects': ['unknown'], 'probability': float(max(rest, 0.0)),
-                     'rmse': self.selection.error(frozenset())})
+                     'rmse': self.sets.error(frozenset())})
         return sorted(rows, key=lambda row: -row['probability'])
 
     def _known(self, chosen: frozenset[str], unobservable: Collection[str]) -> str:
@@ -158,24 +158,22 @@ class _Verdict:
 
     def _unexplained(self, chosen: frozenset[str]) -> float:
         """Share of the first mean square that neither set nor base model nor noise explains."""
-        selection = self.selection
-        beyond = selection.noise_free_rmse(chosen) ** 2 - selection.rmse_95 ** 2
-        first = selection.error(frozenset()) ** 2
+        beyond = self.sets.noise_free_rmse(chosen) ** 2 - self.sets.rmse_95 ** 2
+        first = self.sets.error(frozenset()) ** 2
         return float(np.clip(beyond / max(first, 1e-300), 0.0, 1.0))
 
     def _alternatives(self, chosen: frozenset[str], valid: Sequence[frozenset[str]]
                       ) -> dict[str, list[str]]:
         """For each effect of the answer, name those that could as well be in its place."""
-        selection = self.selection
         found: dict[str, list[str]] = {name: [] for name in chosen}
         if not chosen:
             return found
-        best = selection.log_posterior(chosen)
+        best = self.sets.log_posterior(chosen)
         least = best + math.log(self.settings.reported)
-        for names in selection.valid():
+        for names in self.sets.valid():
             if (names == chosen or len(names) != len(chosen)
-                    or selection.log_posterior(names) < least
-                    or not selection.sufficient(names)):
+                    or self.sets.log_posterior(names) < least
+                    or not self.sets.sufficient(names)):
                 continue
             places, new = sorted(chosen - names), sorted(names - chosen)
             for place, other in zip(places, new):
@@ -186,11 +184,10 @@ class _Verdict:
 
     def _resembles(self, best: frozenset[str]) -> list[str]:
         """Name the effects of an implausible set that explains far more than the best one."""
-        selection = self.selection
-        sets = [names for names, fit in selection.fits.items()
+        sets = [names for names, fit in self.sets.fits.items()
                 if names and len(names) <= max(len(best), 1) and fit.implausible()]
-        names = min(sets, key=selection.error, default=None)
-        if names is None or selection.error(names) > RESEMBLES * selection.error(best):
+        names = min(sets, key=self.sets.error, default=None)
+        if names is None or self.sets.error(names) > RESEMBLES * self.sets.error(best):
             return []
         return sorted(names)
 
@@ -203,27 +200,27 @@ class _Verdict:
             strongest.append(effect.with_values(**{
                 parameter.name: (parameter.choices[-1] if parameter.choices else parameter.high)
                 for parameter in effect.parameters if kind in parameter.kinds}))
-        changes = self.fitter.simulate([[one] for one in strongest]) - selection.base.predicted
+        changes = self.fitter.simulate([[one] for one in strongest]) - self.sets.base.predicted
         sizes = np.sqrt(np.mean(changes ** 2, axis=1))
         return {name: 'even a strong one would change less than the noise'
                 for name, size in zip(selection.names, sizes)
-                if np.isfinite(size) and size < LEAST_CHANGE * selection.rmse_95}
+                if np.isfinite(size) and size < LEAST_CHANGE * self.sets.rmse_95}
 
     def _ranking(self, missing: Sequence[str], before: float) -> list[dict[str, Any]]:
         selection, problem = self.selection, self.problem
-        alone = [fit for names, fit in selection.fits.items() if len(names) == 1]
+        alone = [fit for names, fit in self.sets.fits.items() if len(names) == 1]
         if not alone:
             return []
         rows = []
         for fit in self.fitter.cross_validate(alone):
             effect = self.fitter.with_intervals(fit)[0]
             gain = significance.gain_interval(
-                problem.measured - selection.base.predicted, problem.measured - fit.held_out,
+                problem.measured - self.sets.base.predicted, problem.measured - fit.held_out,
                 problem.block, selection.rng)
             rows.append(verdict.ranking_row(
                 effect, fit, before, self.fitter.error(fit.held_out),
-                selection.p_values.get(effect.id, 1.0), gain))
+                self.sets.p_values.get(effect.id, 1.0), gain))
         verdict.add_signatures(
-            rows, np.stack([fit.predicted - selection.base.predicted for fit in alone]),
+            rows, np.stack([fit.predicted - self.sets.base.predicted for fit in alone]),
             problem.weight_columns(selection.fixed))
         return verdict.in_order(rows, missing)

@@ -37,13 +37,13 @@ def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | No
     time : float or None
         Seconds since the first recording began; None for a recording that is too short.
     log_posterior : float
-        On the scale of `Selection.log_posterior`.
+        On the scale of `FittedSets.log_posterior`.
     """
     count = len(problem.measured)
     margin = max(2, int(MARGIN * count))
     if count < 4 * margin:
         return None, -np.inf
-    residual = problem.measured - selection.base.predicted
+    residual = problem.measured - selection.sets.base.predicted
     rows = np.arange(margin, count - margin)
     steps = (np.arange(count)[:, None] >= rows[None, :]).astype(float)
     gain = sensitivity(problem, selection.fixed)
@@ -66,8 +66,7 @@ def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | No
             index = int(np.argmax(evidence))
             if evidence[index] > best:
                 best, moment = float(evidence[index]), rows[index]
-    odds = math.log(selection.settings.prior / (1.0 - selection.settings.prior))
-    total = best / selection.temper + odds - math.log(len(rows) * len(shapes))
+    total = best / selection.sets.temper + selection.sets.odds - math.log(len(rows) * len(shapes))
     return float(problem.clock[moment]), total
 
 

@@ -360,7 +360,7 @@ def _on_arm(problem: ArmProblem, model: MuscleModel, classes: Sequence[type[Effe
             ) -> list[Fitted]:
     """Fit effects one after the other, each with those before; the weights stay."""
     selection = Selection(problem, Settings(), np.random.default_rng(0), lambda items, total: items)
-    fit = selection.base
+    fit = selection.sets.base
     found: list[Fitted] = []
     for kind in classes:
         fit = selection.add(fit, present(model, kind))

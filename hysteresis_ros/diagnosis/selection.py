@@ -11,10 +11,9 @@ full fits.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 import dataclasses
 import itertools
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,10 +21,10 @@ import numpy as np
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance, Point
 from hysteresis_ros.diagnosis.discrepancy import discrepancy_along
+from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
 from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_starts
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
-from hysteresis_ros.diagnosis.residual import heteroscedasticity_p_value
 from hysteresis_ros.effects import Effect
 
 if TYPE_CHECKING:
@@ -38,12 +37,6 @@ if TYPE_CHECKING:
 FIRST_POINTS = ((0.1, 0.05), (0.4, 0.3), (1.5, 0.3), (6.0, 0.3))
 # Sets that are begun, for one that is fitted to the end, and steps of what is begun.
 BEGUN, FIRST_STEPS = 3, 3
-# Of several effects each has to take this share off the first error, to be seen with the others.
-LEAST_SHARE = 0.015
-SIGNIFICANCE = 0.05
-# The same for noise that is not as large at all times: so many noisy recordings are called unknown
-# by chance.
-NOISE_SIGNIFICANCE = 0.01
 
 
 class Selection:
@@ -60,25 +53,18 @@ class Selection:
 
     Attributes
     ----------
-    base : Fit
-        Without any further effect.
-    fits : dict of frozenset of str to Fit
-        The best full fit of each set.
+    sets : FittedSets
+        What was fitted, at first without any further effect.
+    covariance : Covariance
+        Of the base model's residuals.
     unobservable : dict of str to str
         Effects that this data cannot show, with the reason.
-    rmse_95 : float
-        Root mean square that the base model's own error stays below at 95 %, in the unit of the
-        response.
-    temper : float
-        What log evidences are divided by; see `Settings.coarsening`.
     """
 
     def __init__(self, problem: ArmProblem, settings: Settings, rng: np.random.Generator,
                  progress: Progress) -> None:
         self.problem, self.settings = problem, settings
         self.rng, self.progress = rng, progress
-        self._odds = math.log(settings.prior / (1.0 - settings.prior))
-        self.temper = 1.0 + len(problem.measured) / settings.coarsening
         self.names, self.unobservable = observable(problem)
         self.fixed = list(problem.model.effects)
         predicted = problem.simulate(self.fixed)
@@ -90,25 +76,15 @@ class Selection:
         for drift, noise in FIRST_POINTS:
             self.covariance.add(self.covariance.start(drift, noise))
         self.covariance.add(self.covariance.fit(problem.measured - predicted))
-        self.base = self.fitter.judge(
-            Fit([], np.zeros(0), predicted, np.zeros((len(predicted), 0))))
-        self.fits: dict[frozenset[str], Fit] = {frozenset(): self.base}
+        self.sets = FittedSets(self.fitter, settings, rng)
+        self.sets.keep(self.fitter.judge(
+            Fit([], np.zeros(0), predicted, np.zeros((len(predicted), 0)))))
         self._grown: set[frozenset[str]] = set()
         self._refined: set[frozenset[str]] = set()
         self._exchanged: set[frozenset[str]] = set()
-        self._least_errors: dict[frozenset[str], float] = {}
         # Each with the response that it belongs to.
         self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
-        self._errors: dict[frozenset[str], tuple[np.ndarray, float]] = {}
-        self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
-        # Of its own, or all other draws would depend on whether this one is needed.
-        self._noise_rng, = rng.spawn(1)
-        # The same draws for all, or chance would decide between two sets.
-        self._seed = int(rng.integers(2 ** 32))
-        self.rmse_95 = self._largest_error(self.covariance)
-        self._largest_errors: dict[frozenset[str], tuple[Covariance, float]] = {}
         self.alone: Linearised
-        self.p_values: dict[str, float] = {}
 
     def _discrepancy(self, fit: Fit) -> Discrepancy:
         """
@@ -143,7 +119,7 @@ class Selection:
         """
         starts = [[effect] for effect in self.alone.best_starts()]
         self._begin(starts, len(starts))
-        self.p_values = self._significance()
+        self.sets.p_values = self._significance()
         self._grown.add(frozenset())
         self._refine(1)
 
@@ -158,22 +134,22 @@ class Selection:
             for names in grown_from:
                 self.grow(names)
             self._refine(size + 1)
-            if size == 1 and not any(map(self.sufficient, self.valid())):
+            if size == 1 and not any(map(self.sets.sufficient, self.sets.valid())):
                 self._fit_from_all_starts(2)
         self._refine_best()
         self._exchange()
 
     def _significance(self) -> dict[str, float]:
         """Return family-wise p values of single effects, linearised at starts and at fits too."""
-        fitted = []
-        for fit in self.fits.values():
+        fitted, base = [], self.sets.base
+        for fit in self.sets.fits.values():
             if fit.effects:
                 mean, spread = ParameterVector(fit.effects, self.problem.kind).prior()
-                change = fit.predicted - self.base.predicted + fit.jacobian @ (mean - fit.vector)
+                change = fit.predicted - base.predicted + fit.jacobian @ (mean - fit.vector)
                 fitted.append(Start(fit.effects[0], change, fit.jacobian * spread))
-        family = Linearised(self.covariance.points, self.problem.measured - self.base.predicted,
+        family = Linearised(self.covariance.points, self.problem.measured - base.predicted,
                             [*self.alone.starts, *fitted])
-        return family.p_values(self.fitter.point(self.base), self.rng, self.settings.draws)
+        return family.p_values(self.fitter.point(base), self.rng, self.settings.draws)
 
     def _worth_growing(self, size: int) -> list[frozenset[str]]:
         """
@@ -182,12 +158,12 @@ class Selection:
         The most probable ones, if the best set's residual is too large. If it is not, but a further
         effect explains some of it: all of these single effects, and of larger sets the best alone.
         """
-        valid = self.valid()
-        best = next(filter(self.sufficient, valid), valid[0] if valid else None)
-        if best is None or self.noise_free_rmse(best) > self.rmse_95:
+        valid = self.sets.valid()
+        best = next(filter(self.sets.sufficient, valid), valid[0] if valid else None)
+        if best is None or self.sets.noise_free_rmse(best) > self.sets.rmse_95:
             return self._ranked_of(size)
         # What a further effect explains has to exceed the base model's own error.
-        if not best or self.error(best) <= self.covariance.size or not self._promising(best):
+        if not best or self.sets.error(best) <= self.covariance.size or not self._promising(best):
             return []
         if size == 1:
             return self._ranked_of(size)
@@ -198,14 +174,14 @@ class Selection:
         further = self._linearised_with(names)
         alone, = further.evidences(np.zeros((1, 0), dtype=int))
         gain = max((value for value, _ in further.singles().values()), default=-np.inf) - alone
-        return gain / self.temper > -self._odds
+        return gain / self.sets.temper > -self.sets.odds
 
     def grow(self, names: frozenset[str]) -> None:
         """Fit the best sets of one more effect than those named."""
         if names in self._grown:
             return
         self._grown.add(names)
-        fit = self.fits[names]
+        fit = self.sets.fits[names]
         found = self._linearised_with(names).singles()
         self._fit_best({key: (value, [
             *(one for one in fit.effects if one.id not in effects[0].replaces), *effects])
@@ -246,7 +222,7 @@ class Selection:
 
     def _linearised_with(self, names: frozenset[str]) -> Linearised:
         """Return all other effects, linearised at the values that those of a set have."""
-        fit = self.fits[names]
+        fit = self.sets.fits[names]
         known = self._linearised.get(names)
         if known is None or known[0] is not fit.predicted:
             self._linearised[names] = known = (fit.predicted, self._linearised_at(fit))
@@ -286,11 +262,12 @@ class Selection:
 
         The start that scores best by linearisation may be one that no fit gets away from.
         """
-        probable = [names for names in self.ranked() if len(names) == size]
+        probable = [names for names in self.sets.ranked() if len(names) == size]
         starts: list[tuple[Effect, ...]] = []
         for names in probable[:self.settings.refits]:
             starts += itertools.product(*(
-                self._starts_of(effect, self.base) for effect in self.fits[names].effects))
+                self._starts_of(effect, self.sets.base)
+                for effect in self.sets.fits[names].effects))
         self._begin(starts, self.settings.refits)
         self._refine(size)
 
@@ -306,7 +283,7 @@ class Selection:
             if len(names) < 2 or names in self._exchanged:
                 return
             self._exchanged.add(names)
-            whole = self.fits[names]
+            whole = self.sets.fits[names]
             for out in exchanged:
                 kept = [effect for effect in whole.effects if effect.id != out]
                 for rest in self.fitter.fit([kept], self._metric(), 0):
@@ -327,27 +304,22 @@ class Selection:
         Those whose values are not physical, of the most probable set of all if that would suffice:
         they stand for something else. Then all of the answer.
         """
-        answer = next(iter(self.valid()), frozenset())
-        best = next(names for names in self.ranked()
+        answer = next(iter(self.sets.valid()), frozenset())
+        best = next(names for names in self.sets.ranked()
                     if names not in self._exchanged or names == answer)
-        implausible = {one.split('.')[0] for one in self.fits[best].implausible()}
-        if implausible and len(best) > 1 and self.sufficient(best):
+        implausible = {one.split('.')[0] for one in self.sets.fits[best].implausible()}
+        if implausible and len(best) > 1 and self.sets.sufficient(best):
             return best, sorted(implausible)
-        return (answer, sorted(answer)) if self.sufficient(answer) else (frozenset(), [])
+        return (answer, sorted(answer)) if self.sets.sufficient(answer) else (frozenset(), [])
 
     def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
         for fit in self.fitter.fit(sets, self._metric()):
-            self._keep(self.fitter.polished(self.fitter.along(fit)))
+            self.sets.keep(self.fitter.polished(self.fitter.along(fit)))
 
     def _metric(self) -> Point:
         """Return the covariance in whose units fits are made: the expected discrepancy's."""
         return self.covariance.points[1]
-
-    def _keep(self, fit: Fit) -> None:
-        names = frozenset(fit.names)
-        if names not in self.fits or fit.log_evidence > self.fits[names].log_evidence:
-            self.fits[names] = fit
 
     def _refine(self, size: int) -> None:
         """Give the most probable sets of a size covariances of their own, then judge all anew."""
@@ -357,169 +329,25 @@ class Selection:
                 break
             names = found[0]
             self._refined.add(names)
-            self.fits[names] = self.fitter.refined(self.fits[names])
-            least = self.fitter.least_squares(self.fits[names])
-            self._least_errors[names] = self.fitter.error(least.predicted)
+            self.sets.fits[names] = self.fitter.refined(self.sets.fits[names])
+            least = self.fitter.least_squares(self.sets.fits[names])
+            self.sets.keep_least(names, self.fitter.error(least.predicted))
             # Under a covariance the way to the maximum is rough, and not under white noise.
-            self._keep(self.fitter.polished(self.fitter.along(least)))
-            self._errors.pop(names, None)
-        self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
-        self.base = self.fits[frozenset()]
+            self.sets.keep(self.fitter.polished(self.fitter.along(least)))
+        self.sets.judge_all()
 
     def _refine_best(self) -> None:
         """Fit what remains of the most probable sets without any one of their effects."""
         for _ in range(self.settings.most_effects):
-            valid = self.valid()
+            valid = self.sets.valid()
             if not valid:
                 return
-            missing = [names for one in valid[:self.settings.beam] for names in _subsets(one)
-                       if names not in self.fits]
+            missing = [names for one in valid[:self.settings.beam] for names in subsets(one)
+                       if names not in self.sets.fits]
             if not missing:
                 return
-            self._fit([[effect for effect in self.fits[one].effects if effect.id in names]
+            self._fit([[effect for effect in self.sets.fits[one].effects if effect.id in names]
                        for names in missing for one in valid if names < one][:len(missing)])
 
     def _ranked_of(self, size: int) -> list[frozenset[str]]:
-        return [names for names in self.ranked() if len(names) == size][:self.settings.beam]
-
-    def log_posterior(self, names: frozenset[str]) -> float:
-        """
-        Return the logarithm of a set's posterior probability, but for a constant.
-
-        An effect whose equation contains that of another one says that both act.
-        """
-        fit = self.fits[names]
-        acting = len(names) + sum(bool(effect.replaces) for effect in fit.effects)
-        return fit.log_evidence / self.temper + self._odds * acting
-
-    def ranked(self) -> list[frozenset[str]]:
-        """Return all sets that were fitted, most probable first."""
-        return sorted(self.fits, key=lambda names: -self.log_posterior(names))
-
-    def error(self, names: frozenset[str]) -> float:
-        """
-        Return the RMSE of a set on all judged rows, fitted by least squares.
-
-        Parameters
-        ----------
-        names : frozenset of str
-            A set that was fitted.
-
-        Returns
-        -------
-        float
-            In the unit of the response.
-
-        Raises
-        ------
-        KeyError
-            If the set was not fitted.
-        """
-        fit = self.fits[names]
-        known = self._errors.get(names)
-        if known is None or known[0] is not fit.predicted:
-            least = self._least_errors.get(names)
-            found = (self.fitter.least_error(fit) if least is None
-                     else min(least, self.fitter.error(fit.predicted)))
-            self._errors[names] = known = (fit.predicted, found)
-        return known[1]
-
-    def noise_free_rmse(self, names: frozenset[str]) -> float:
-        """
-        Return the root mean square of a set's residual without white noise.
-
-        What is larger than the base model's own error could be, and not as large at all times, is
-        no noise: it has a cause.
-        """
-        noise = 0.0 if self.uneven(names) else self.fits[names].noise
-        return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
-
-    def uneven(self, names: frozenset[str]) -> bool:
-        """Whether what a set leaves looks like noise, but has a cause: see `noise_free_rmse`."""
-        return (self.fits[names].noise > self.rmse_95
-                and self._noise_p_value(names) <= NOISE_SIGNIFICANCE)
-
-    def _noise_p_value(self, names: frozenset[str]) -> float:
-        """Return the p value that a set's residual is as large at all times."""
-        fit = self.fits[names]
-        known = self._noise_p_values.get(names)
-        if known is None or known[0] is not fit.predicted:
-            p_value = heteroscedasticity_p_value(
-                self.problem.measured - fit.predicted, self.problem.trial, self._noise_rng,
-                self.settings.draws)
-            self._noise_p_values[names] = known = (fit.predicted, p_value)
-        return known[1]
-
-    def sufficient(self, names: frozenset[str]) -> bool:
-        """
-        Whether base model and equations of the effects could be as wrong as a set's residual.
-
-        Along the way that the arm takes with these effects: friction, say, keeps the load from a
-        muscle that cools down, which no load at rest shows.
-        """
-        covariance = self.fits[names].covariance
-        if covariance is None:
-            return self.noise_free_rmse(names) <= self.rmse_95
-        known = self._largest_errors.get(names)
-        if known is None or known[0] is not covariance:
-            self._largest_errors[names] = known = (covariance, self._largest_error(covariance))
-        return self.noise_free_rmse(names) <= known[1]
-
-    def _largest_error(self, covariance: Covariance) -> float:
-        """Return the root mean square that a discrepancy stays below at 95 %."""
-        return covariance.largest_error(np.random.default_rng(self._seed), self.settings.draws)
-
-    def valid(self) -> list[frozenset[str]]:
-        """
-        Return the sets that may be the answer, most probable first.
-
-        All values are physical, and each effect matters: without it the error is larger by a
-        practical size and by more than the expected error of the base model, and if others stay,
-        it is larger than the base model's own error could be, or these are clearly less probable.
-        A single effect also has to explain more than the best of all would by chance; and no set
-        of as few effects has a smaller residual, by more than the base model's error and that of an
-        effect's equation could be.
-        """
-        physical = [names for names in self.ranked() if not self.fits[names].implausible()]
-        return [names for names in physical if self._each_matters(names)
-                and (len(names) != 1 or self.p_values.get(next(iter(names)), 1.0) <= SIGNIFICANCE)
-                and not self._surpassed(names, physical)]
-
-    def _each_matters(self, names: frozenset[str]) -> bool:
-        error = self.error(names)
-        for without in _subsets(names):
-            if without not in self.fits:
-                continue
-            before = self.error(without)
-            least = max(self.settings.practical * before,
-                        LEAST_SHARE * self.error(frozenset()))
-            if (before - error < least or before ** 2 - error ** 2 < self.covariance.size ** 2
-                    or (without and self._would_do(without, names))):
-                return False
-        return True
-
-    def _surpassed(self, names: frozenset[str], others: Iterable[frozenset[str]]) -> bool:
-        """Whether another set of as few effects predicts far better."""
-        form = self.settings.form * self.error(frozenset())
-        least = self.error(names) ** 2 - self.covariance.size ** 2 - form ** 2
-        return least > 0.0 and any(self.error(other) ** 2 < least for other in others
-                                   if 0 < len(other) <= len(names))
-
-    def _would_do(self, without: frozenset[str], names: frozenset[str]) -> bool:
-        """
-        Whether a smaller set may be the answer, and is not clearly less probable.
-
-        Where it leaves more than the base model's own error could be, and the larger set does not,
-        it must not be less probable at all.
-        """
-        if not self.sufficient(without) or self.fits[without].implausible():
-            return False
-        odds = self.log_posterior(names) - self.log_posterior(without)
-        if self.noise_free_rmse(without) > self.rmse_95 >= self.noise_free_rmse(names):
-            return odds < 0.0
-        return odds < -math.log(self.settings.reported)
-
-
-def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
-    """Return the sets that lack one of the effects named."""
-    return [names - {name} for name in names]
+        return [names for names in self.sets.ranked() if len(names) == size][:self.settings.beam]

@@ -1,0 +1,233 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which of the sets of effects that were fitted to runs of an arm may be the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.residual import heteroscedasticity_p_value
+
+if TYPE_CHECKING:
+    from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
+    from hysteresis_ros.diagnosis.covariance import Covariance
+    from hysteresis_ros.diagnosis.settings import Settings
+
+# Of several effects each has to take this share off the first error, to be seen with the others.
+LEAST_SHARE = 0.015
+SIGNIFICANCE = 0.05
+# The same for noise that is not as large at all times: so many noisy recordings are called unknown
+# by chance.
+NOISE_SIGNIFICANCE = 0.01
+
+
+class FittedSets:
+    """
+    Sets of effects that were fitted, and which of them may be the answer.
+
+    Parameters
+    ----------
+    fitter : Fitter
+        Of the runs, with the covariance of the base model's residuals.
+    settings : Settings
+    rng : numpy.random.Generator
+
+    Attributes
+    ----------
+    fits : dict of frozenset of str to Fit
+        The best full fit of each set.
+    p_values : dict of str to float
+        Of single effects, over all of them; those that are missing are taken for 1.
+    rmse_95 : float
+        Root mean square that the base model's own error stays below at 95 %, in the unit of the
+        response.
+    odds : float
+        Logarithm of the odds that an effect acts, before any data.
+    temper : float
+        What log evidences are divided by; see `Settings.coarsening`.
+    """
+
+    def __init__(self, fitter: Fitter, settings: Settings, rng: np.random.Generator) -> None:
+        self.fitter, self.settings = fitter, settings
+        self.problem, self.covariance = fitter.problem, fitter.covariance
+        self.fits: dict[frozenset[str], Fit] = {}
+        self.p_values: dict[str, float] = {}
+        self.odds = math.log(settings.prior / (1.0 - settings.prior))
+        self.temper = 1.0 + len(self.problem.measured) / settings.coarsening
+        # Smallest that were found, by least squares.
+        self._least_errors: dict[frozenset[str], float] = {}
+        # Each with the response that it belongs to.
+        self._errors: dict[frozenset[str], tuple[np.ndarray, float]] = {}
+        self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
+        # Of its own, or all other draws would depend on whether this one is needed.
+        self._noise_rng, = rng.spawn(1)
+        # The same draws for all, or chance would decide between two sets.
+        self._seed = int(rng.integers(2 ** 32))
+        self.rmse_95 = self._largest_error(self.covariance)
+        self._largest_errors: dict[frozenset[str], tuple[Covariance, float]] = {}
+
+    @property
+    def base(self) -> Fit:
+        """Without any further effect."""
+        return self.fits[frozenset()]
+
+    def keep(self, fit: Fit) -> None:
+        """Keep a fit where it is the best of its effects."""
+        names = frozenset(fit.names)
+        if names not in self.fits or fit.log_evidence > self.fits[names].log_evidence:
+            self.fits[names] = fit
+
+    def judge_all(self) -> None:
+        """Judge all fits under the covariances that are at hand now."""
+        self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
+
+    def keep_least(self, names: frozenset[str], error: float) -> None:
+        """Keep the smallest error of a set, in the unit of the response."""
+        self._least_errors[names] = error
+        self._errors.pop(names, None)
+
+    def log_posterior(self, names: frozenset[str]) -> float:
+        """
+        Return the logarithm of a set's posterior probability, but for a constant.
+
+        An effect whose equation contains that of another one says that both act.
+        """
+        fit = self.fits[names]
+        acting = len(names) + sum(bool(effect.replaces) for effect in fit.effects)
+        return fit.log_evidence / self.temper + self.odds * acting
+
+    def ranked(self) -> list[frozenset[str]]:
+        """Return all sets that were fitted, most probable first."""
+        return sorted(self.fits, key=lambda names: -self.log_posterior(names))
+
+    def error(self, names: frozenset[str]) -> float:
+        """
+        Return the RMSE of a set on all judged rows, fitted by least squares.
+
+        Parameters
+        ----------
+        names : frozenset of str
+            A set that was fitted.
+
+        Returns
+        -------
+        float
+            In the unit of the response.
+
+        Raises
+        ------
+        KeyError
+            If the set was not fitted.
+        """
+        fit = self.fits[names]
+        known = self._errors.get(names)
+        if known is None or known[0] is not fit.predicted:
+            least = self._least_errors.get(names)
+            found = (self.fitter.least_error(fit) if least is None
+                     else min(least, self.fitter.error(fit.predicted)))
+            self._errors[names] = known = (fit.predicted, found)
+        return known[1]
+
+    def noise_free_rmse(self, names: frozenset[str]) -> float:
+        """
+        Return the root mean square of a set's residual without white noise.
+
+        What is larger than the base model's own error could be, and not as large at all times, is
+        no noise: it has a cause.
+        """
+        noise = 0.0 if self.uneven(names) else self.fits[names].noise
+        return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
+
+    def uneven(self, names: frozenset[str]) -> bool:
+        """Whether what a set leaves looks like noise, but has a cause: see `noise_free_rmse`."""
+        return (self.fits[names].noise > self.rmse_95
+                and self._noise_p_value(names) <= NOISE_SIGNIFICANCE)
+
+    def _noise_p_value(self, names: frozenset[str]) -> float:
+        """Return the p value that a set's residual is as large at all times."""
+        fit = self.fits[names]
+        known = self._noise_p_values.get(names)
+        if known is None or known[0] is not fit.predicted:
+            p_value = heteroscedasticity_p_value(
+                self.problem.measured - fit.predicted, self.problem.trial, self._noise_rng,
+                self.settings.draws)
+            self._noise_p_values[names] = known = (fit.predicted, p_value)
+        return known[1]
+
+    def sufficient(self, names: frozenset[str]) -> bool:
+        """
+        Whether base model and equations of the effects could be as wrong as a set's residual.
+
+        Along the way that the arm takes with these effects: friction, say, keeps the load from a
+        muscle that cools down, which no load at rest shows.
+        """
+        covariance = self.fits[names].covariance
+        if covariance is None:
+            return self.noise_free_rmse(names) <= self.rmse_95
+        known = self._largest_errors.get(names)
+        if known is None or known[0] is not covariance:
+            self._largest_errors[names] = known = (covariance, self._largest_error(covariance))
+        return self.noise_free_rmse(names) <= known[1]
+
+    def _largest_error(self, covariance: Covariance) -> float:
+        """Return the root mean square that a discrepancy stays below at 95 %."""
+        return covariance.largest_error(np.random.default_rng(self._seed), self.settings.draws)
+
+    def valid(self) -> list[frozenset[str]]:
+        """
+        Return the sets that may be the answer, most probable first.
+
+        All values are physical, and each effect matters: without it the error is larger by a
+        practical size and by more than the expected error of the base model, and if others stay,
+        it is larger than the base model's own error could be, or these are clearly less probable.
+        A single effect also has to explain more than the best of all would by chance; and no set
+        of as few effects has a smaller residual, by more than the base model's error and that of an
+        effect's equation could be.
+        """
+        physical = [names for names in self.ranked() if not self.fits[names].implausible()]
+        return [names for names in physical if self._each_matters(names)
+                and (len(names) != 1 or self.p_values.get(next(iter(names)), 1.0) <= SIGNIFICANCE)
+                and not self._surpassed(names, physical)]
+
+    def _each_matters(self, names: frozenset[str]) -> bool:
+        error = self.error(names)
+        for without in subsets(names):
+            if without not in self.fits:
+                continue
+            before = self.error(without)
+            least = max(self.settings.practical * before,
+                        LEAST_SHARE * self.error(frozenset()))
+            if (before - error < least or before ** 2 - error ** 2 < self.covariance.size ** 2
+                    or (without and self._would_do(without, names))):
+                return False
+        return True
+
+    def _surpassed(self, names: frozenset[str], others: Iterable[frozenset[str]]) -> bool:
+        """Whether another set of as few effects predicts far better."""
+        form = self.settings.form * self.error(frozenset())
+        least = self.error(names) ** 2 - self.covariance.size ** 2 - form ** 2
+        return least > 0.0 and any(self.error(other) ** 2 < least for other in others
+                                   if 0 < len(other) <= len(names))
+
+    def _would_do(self, without: frozenset[str], names: frozenset[str]) -> bool:
+        """
+        Whether a smaller set may be the answer, and is not clearly less probable.
+
+        Where it leaves more than the base model's own error could be, and the larger set does not,
+        it must not be less probable at all.
+        """
+        if not self.sufficient(without) or self.fits[without].implausible():
+            return False
+        odds = self.log_posterior(names) - self.log_posterior(without)
+        if self.noise_free_rmse(without) > self.rmse_95 >= self.noise_free_rmse(names):
+            return odds < 0.0
+        return odds < -math.log(self.settings.reported)
+
+
+def subsets(names: frozenset[str]) -> list[frozenset[str]]:
+    """Return the sets that lack one of the effects named."""
+    return [names - {name} for name in names]
