@@ -15,6 +15,7 @@ from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, sensitivity
 from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.linearised import Linearised, linearised_starts
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.measurements import Measurement
@@ -116,6 +117,21 @@ def test_a_larger_set_is_no_answer_where_a_smaller_one_suffices(payload):
     larger = [names for names in payload.sets.fits if len(names) > 1 and 'payload_error' in names]
     assert larger
     assert not set(larger) & set(payload.sets.valid())
+
+
+def test_with_other_effects_the_best_starts_are_still_the_best(model):
+    """Chosen by the derivatives that they had alone, and linearised anew."""
+    measured = recording(model, [effect_of(model, 'payload_error', dm=15.0),
+                                 effect_of(model, 'encoder_eccentricity', e=4.0, phi=1.0)])
+    found = selection(model, measured, ('payload_error', 'encoder_eccentricity'))
+    fitter, fit = found.fitter, found.sets.fits[frozenset(['payload_error'])]
+    names, own = ['encoder_eccentricity'], found.fitter.point(fit)
+    residual = found.problem.measured - fit.predicted
+    every = Linearised([own], residual, linearised_starts(fitter, fit, names))
+    few = Linearised([own], residual, linearised_starts(
+        fitter, fit, names, found.alone.starts, own))
+    assert len(few.starts) < len(every.starts)
+    assert few.singles()[tuple(names)][0] == pytest.approx(every.singles()[tuple(names)][0])
 
 
 def test_a_smaller_set_that_is_implausible_would_not_do(payload, monkeypatch):

@@ -1,0 +1,71 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is kept of the sets of effects that were fitted to a recording."""
+
+import dataclasses
+
+from model_support import bicep_model, effect_of, runs
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.selection import Selection
+from hysteresis_ros.diagnosis.settings import Settings
+
+NAMES = frozenset(['payload_error'])
+
+
+@pytest.fixture(scope='module')
+def fitter():
+    """Return a fitter for settled trials of an arm that carries 15 g more."""
+    model = bicep_model()
+    measured = runs(model.with_effects([effect_of(model, 'payload_error', dm=15.0)]), rows=30)
+    return Selection(problem_for(model, [measured], NAMES), Settings(),
+                     np.random.default_rng(0), lambda items, total: items).fitter
+
+
+@pytest.fixture
+def sets(fitter):
+    """Return an empty collection."""
+    return FittedSets(fitter, Settings(), np.random.default_rng(0))
+
+
+def fitted(fitter, steps=12):
+    """Return the payload, fitted from 5 g in so many steps at most."""
+    payload = effect_of(fitter.problem.model, 'payload_error', dm=5.0)
+    fit, = fitter.fit([[payload]], fitter.covariance.points[1], steps)
+    return fit
+
+
+def test_of_each_set_the_most_probable_fit_is_kept(fitter, sets):
+    """Whichever comes first."""
+    poor, good = fitted(fitter, 0), fitted(fitter)
+    assert poor.log_evidence < good.log_evidence
+    for order in ((poor, good), (good, poor)):
+        for fit in order:
+            sets.keep(fit)
+        assert sets.fits[NAMES] is good
+        sets.fits.clear()
+
+
+def test_the_error_of_a_set_is_the_smallest_that_was_found(fitter, sets):
+    """Also where a smaller one is found after it was asked for, and no larger one counts."""
+    sets.keep(fitted(fitter))
+    before = sets.error(NAMES)
+    assert before < 0.01
+    sets.keep_least(NAMES, 0.5 * before)
+    assert sets.error(NAMES) == 0.5 * before
+    sets.keep_least(NAMES, 1.0)
+    assert sets.error(NAMES) == pytest.approx(fitter.error(sets.fits[NAMES].predicted))
+
+
+def test_fits_are_judged_anew_with_each_covariance_that_is_added(fitter, sets):
+    sets.keep(dataclasses.replace(fitted(fitter), log_evidence=-np.inf))
+    sets.judge_all()
+    assert sets.fits[NAMES].log_evidence == pytest.approx(fitted(fitter).log_evidence)
+
+
+def test_the_subsets_of_a_set_lack_one_effect_each():
+    assert set(subsets(frozenset('abc'))) == {frozenset('ab'), frozenset('ac'), frozenset('bc')}
+    assert subsets(frozenset()) == []
