@@ -163,15 +163,26 @@ class FittedSets:
         Whether base model and equations of the effects could be as wrong as a set's residual.
 
         Along the way that the arm takes with these effects: friction, say, keeps the load from a
-        muscle that cools down, which no load at rest shows.
+        muscle that cools down, which no load at rest shows. What the effects make the model more
+        uncertain by counts as far as they explain more than that: with an effect that explains as
+        little as it makes uncertain, anything would suffice.
         """
+        return self.noise_free_rmse(names) <= self._allowed(names)
+
+    def _allowed(self, names: frozenset[str]) -> float:
+        """Return the root mean square that a set may leave, in the unit of the response."""
         covariance = self.fits[names].covariance
         if covariance is None:
-            return self.noise_free_rmse(names) <= self.rmse_95
+            return self.rmse_95
         known = self._largest_errors.get(names)
         if known is None or known[0] is not covariance:
             self._largest_errors[names] = known = (covariance, self._largest_error(covariance))
-        return self.noise_free_rmse(names) <= known[1]
+        explained = self.error(frozenset()) ** 2 - self.error(names) ** 2
+        further = known[1] ** 2 - self.rmse_95 ** 2
+        if further > 0.0:
+            # The share beyond doubt, as James and Stein shrink an estimate by it.
+            further *= max(1.0 - further / max(explained, 1e-300), 0.0)
+        return math.sqrt(self.rmse_95 ** 2 + further)
 
     def _largest_error(self, covariance: Covariance) -> float:
         """Return the root mean square that a discrepancy stays below at 95 %."""
