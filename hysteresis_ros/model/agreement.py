@@ -45,8 +45,10 @@ class KnownPhases:
         self._places: dict[tuple[str, str], int] = {}
         self._values = np.zeros((1, 0))
 
-    def keep(self, effects: Sequence[Effect], phase: np.ndarray) -> None:
-        """Keep the phase (rows,) of a run."""
+    def keep(self, effects: Sequence[Effect], phase: np.ndarray | None) -> None:
+        """Keep the phase (rows,) of a run, if it has needed one."""
+        if phase is None:
+            return
         for effect in effects:
             for name in effect.values:
                 self._places.setdefault((effect.id, name), len(self._places))

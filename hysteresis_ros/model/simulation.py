@@ -131,8 +131,7 @@ class Simulator:
             If the model lacks what this kind of measurement needs.
         """
         response, phase = self._run(effects, inputs_of_stage, exact)
-        if phase is not None:
-            self._phases.keep(effects, phase)
+        self._phases.keep(effects, phase)
         return response
 
     def _run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None,
@@ -214,8 +213,7 @@ class Simulator:
             found = [self._run(effects) for effects in sets]
         # Not before all have run, or the result would depend on who comes first.
         for effects, (_, phase) in zip(sets, found):
-            if phase is not None:
-                self._phases.keep(effects, phase)
+            self._phases.keep(effects, phase)
         return np.array([row for row, _ in found]).reshape(len(sets), self.measurement.rows)
 
     @staticmethod
