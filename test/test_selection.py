@@ -92,7 +92,11 @@ def test_a_set_suffices_as_far_as_model_and_equation_may_be_off(payload, monkeyp
 @pytest.mark.parametrize('explained', [0.0, 0.5, 1.0, 2.0, 50.0])
 def test_what_an_effect_makes_uncertain_counts_as_far_as_it_explains_more(payload, monkeypatch,
                                                                           explained):
-    """Of the square by which the model may be off further, half counts where it explains twice."""
+    """
+    Of the square by which the model may be off further, half counts where it explains twice.
+
+    Where it explains less than that, a quarter of what it explains counts.
+    """
     sets, names = payload.sets, frozenset(['payload_error'])
     own = 3.0 * sets.rmse_95
     further = own ** 2 - sets.rmse_95 ** 2
@@ -100,7 +104,7 @@ def test_what_an_effect_makes_uncertain_counts_as_far_as_it_explains_more(payloa
     monkeypatch.setattr(sets, '_largest_error', lambda covariance: own)
     errors = {frozenset(): np.sqrt(1.0 + explained * further), names: 1.0}
     monkeypatch.setattr(sets, 'error', lambda one: errors[one])
-    counts = {0.0: 0.0, 0.5: 0.0, 1.0: 0.0, 2.0: 0.5, 50.0: 0.98}[explained]
+    counts = {0.0: 0.0, 0.5: 0.125, 1.0: 0.25, 2.0: 0.5, 50.0: 0.98}[explained]
     limit = np.sqrt(sets.rmse_95 ** 2 + counts * further)
     for share, enough in ((0.999, True), (1.001, False)):
         monkeypatch.setattr(sets, 'noise_free_rmse', lambda one, left=share * limit: left)

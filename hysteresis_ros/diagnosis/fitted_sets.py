@@ -180,8 +180,12 @@ class FittedSets:
         explained = self.error(frozenset()) ** 2 - self.error(names) ** 2
         further = known[1] ** 2 - self.rmse_95 ** 2
         if further > 0.0:
-            # The share beyond doubt, as James and Stein shrink an estimate by it.
-            further *= max(1.0 - further / max(explained, 1e-300), 0.0)
+            # The share beyond doubt, as James and Stein shrink an estimate by it. From half of what
+            # is explained on, that share falls faster than the uncertainty grows; but a model that
+            # may be more wrong must not have to fit better.
+            explained = max(explained, 1e-300)
+            further = min(further, explained / 2.0)
+            further *= 1.0 - further / explained
         return math.sqrt(self.rmse_95 ** 2 + further)
 
     def _largest_error(self, covariance: Covariance) -> float:
