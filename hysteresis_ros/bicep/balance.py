@@ -34,6 +34,8 @@ GRID = math.radians(0.1)
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
 _NO_MUSCLE = np.zeros((0, 4)), 0.0
+# Where a trial without rows ends.
+ONE_EMPTY_TRIAL = np.zeros(1, dtype=np.int64)
 # Load [N] over which the slope of what the transformation feels is taken.
 SMALL_LOAD = 1e-3
 # Longest dt of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
@@ -170,7 +172,9 @@ class ArmBalance:
 
     def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
         """Wipe the memory, take up the state of rest under `x`, and return its angle [rad]."""
-        return self._kernels.cool_down(self._arm, self._state, float(x), float(offset))
+        none = np.zeros(0)
+        return self._kernels.run(self._arm, self._state, float(x), float(offset), ONE_EMPTY_TRIAL,
+                                 none, none, none, none)[0]
 
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
              clock: float = 0.0) -> float:
@@ -218,14 +222,14 @@ class ArmBalance:
         angles, outputs, inputs : ndarray, shape (rows,)
             Angle [rad], output of H2 [m], and input of the first muscle's H2.
         """
-        return self._kernels.run(self._arm, self._state, float(cold), ends, *(
+        return self._kernels.run(self._arm, self._state, float(cold), 0.0, ends, *(
             np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))
 
     def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
                 clock: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Go on from the present state; angles, outputs and inputs (rows,) as of `run`."""
-        return self._kernels.proceed(self._arm, self._state, *(
-            np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))
+        return self._kernels.run(self._arm, self._state, math.nan, 0.0, np.array([len(x)]), *(
+            np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))[1:]
 
 
 def statics_of(geometry: BicepGeometry) -> Statics:

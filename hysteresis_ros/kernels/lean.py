@@ -33,3 +33,17 @@ def inlined(function: Function) -> Function:
     if options is not None:
         options['forceinline'] = True
     return compiled
+
+
+def merged(function: Function) -> Function:
+    """
+    Return a lean kernel that is part of the one that calls it, and is not compiled by itself.
+
+    For a large one that is called in one place: `inlined` would have it compiled twice. With many
+    small ones the caller becomes so large that it is compiled badly.
+    """
+    compiled = lean(function)
+    options = getattr(compiled, 'targetoptions', None)
+    if options is not None:
+        options['inline'] = 'always'
+    return compiled

@@ -19,7 +19,7 @@ from .lean import inlined, lean
 from .operator import last_input, last_output, peek, solve, step
 
 
-@lean
+@inlined
 def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: float
            ) -> tuple[int, float]:
     """Commit the u next to the present one at which one muscle balances, and return the place."""
@@ -66,7 +66,7 @@ def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: floa
     return load - play * width(arm, line, k, share) - x - u
 
 
-@lean
+@inlined
 def settle_bundle(arm: Arm, state: State, line: int, x: float, offset: float, factor: float,
                   dt: float) -> tuple[int, float]:
     """Commit what unequal muscles do, and return the place where they balance."""
@@ -125,7 +125,7 @@ def _borne(arm: Arm, state: State, line: int, k: int, share: float, load: float,
     return bundle.mean_load(state.muscles, x)
 
 
-@lean
+@inlined
 def direction(arm: Arm, state: State, x: float, offset: float, factor: float, dt: float) -> int:
     """Return in which direction the arm slides: 1 down, -1 up, 0 where friction holds it."""
     motion = state.motion

@@ -27,7 +27,7 @@ LEAST_GAIN = 1e-3
 EXACT = 1e-9
 
 
-@lean
+@inlined
 def swing(arm: Arm, state: State, x: float, offset: float, factor: float, friction: float,
           grip: float, dt: float) -> tuple[int, float]:
     """

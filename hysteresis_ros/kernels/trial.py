@@ -20,7 +20,7 @@ from .arm import (
     THETA, VELOCITY, X)
 from .formation import LOAD as BEYOND, SIZE
 from .jit import jit
-from .lean import lean
+from .lean import inlined, lean, merged
 from .operator import last_input, last_output, reset
 from .rest import bundle_load_at, direction, settle, settle_bundle
 from .swing import load_at, swing
@@ -53,7 +53,7 @@ def start(arm: Arm, state: State) -> None:
     motion[NEAR_LENGTH] = motion[NEAR_LOAD] = 1.0
 
 
-@lean
+@inlined
 def output(arm: Arm, state: State) -> float:
     """Return the output of H2 [m]; the mean of the muscles."""
     if len(arm.wires.offsets) > 1:
@@ -61,7 +61,7 @@ def output(arm: Arm, state: State) -> float:
     return last_output(arm.wires.table, state.memories[0])
 
 
-@lean
+@merged
 def step(arm: Arm, state: State, x: float, dt: float, offset: float, factor: float) -> float:
     """
     Advance to the next sample and return the angle [rad].
@@ -95,7 +95,7 @@ def step(arm: Arm, state: State, x: float, dt: float, offset: float, factor: flo
     return angle
 
 
-@lean
+@merged
 def _kick(arm: Arm, state: State, x: float, offset: float, factor: float) -> None:
     """Begin a dt with the acceleration under a new x."""
     motion = state.motion
@@ -114,7 +114,7 @@ def _kick(arm: Arm, state: State, x: float, offset: float, factor: float) -> Non
                                 - load * leverage) / arm.inertia
 
 
-@lean
+@merged
 def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor: float) -> float:
     motion = state.motion
     begun = not math.isnan(motion[ANGLE])
@@ -144,45 +144,31 @@ def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor:
     return angle
 
 
-@lean
-def cool_down(arm: Arm, state: State, x: float, offset: float) -> float:
-    """Wipe the memory, cool down to the state of rest under x and an offset; return its angle."""
-    start(arm, state)
-    if arm.wires.kept != 0.0:
-        # What forms on the way down remembers the loads that it meets there.
-        k, share = place(arm, state.motion, 0, 0.0, 0.0)
-        hot = grid.between(arm.grid, LOAD, k, share) - last_input(
-            arm.wires.table, state.memories[0])
-        for n in range(COOLING):
-            step(arm, state, max(hot + n / COOLING * (x - hot), x), np.inf, offset, 1.0)
-    return step(arm, state, x, np.inf, offset, 1.0)
+@inlined
+def _cooling(arm: Arm, state: State, x: float) -> tuple[int, float]:
+    """Return in how many samples a hot muscle cools down to the state of rest, and its x so hot."""
+    if arm.wires.kept == 0.0:
+        return 1, x
+    # What forms on the way down remembers the loads that it meets there.
+    k, share = place(arm, state.motion, 0, 0.0, 0.0)
+    return COOLING + 1, grid.between(arm.grid, LOAD, k, share) - last_input(
+        arm.wires.table, state.memories[0])
 
 
 @jit
-def proceed(arm: Arm, state: State, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
-            factor: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Go on from the present state: as `run`, within one trial."""
-    rows = len(x)
-    angles, outputs, inputs = np.empty(rows), np.empty(rows), np.empty(rows)
-    for n in range(rows):
-        angles[n] = step(arm, state, x[n], dt[n], offset[n], factor[n])
-        outputs[n] = output(arm, state)
-        inputs[n] = last_input(arm.wires.table, state.memories[0])
-    return angles, outputs, inputs
-
-
-@jit
-def run(arm: Arm, state: State, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray,
-        offset: np.ndarray, factor: np.ndarray
+def run(arm: Arm, state: State, cold: float, held: float, ends: np.ndarray, x: np.ndarray,
+        dt: np.ndarray, offset: np.ndarray, factor: np.ndarray
         ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     """
-    Run whole trials, each from the cold state.
+    Run whole trials, each from the cold state, or go on from the present one.
 
     Parameters
     ----------
     arm, state : Arm, State
     cold : float
-        Output of the first stage in the cold state.
+        Output of the first stage in the cold state; NaN to go on from the present state.
+    held : float
+        Offset in the cold state [m]; see `step`.
     ends : ndarray of int, shape (trials,)
         Where each trial ends and the next begins.
     x, dt, offset, factor : ndarray, shape (rows,)
@@ -191,7 +177,7 @@ def run(arm: Arm, state: State, cold: float, ends: np.ndarray, x: np.ndarray, dt
     Returns
     -------
     rest : float
-        Angle of rest in the cold state [rad].
+        Angle of rest in the cold state [rad]; NaN where nothing began there.
     angles, outputs, inputs : ndarray, shape (rows,)
         Angle [rad], output of H2 [m], and input of the first muscle's H2.
 
@@ -200,10 +186,25 @@ def run(arm: Arm, state: State, cold: float, ends: np.ndarray, x: np.ndarray, dt
     angles, outputs, inputs = np.empty(rows), np.empty(rows), np.empty(rows)
     rest, begin = np.nan, 0
     for end in ends:
-        rest = cool_down(arm, state, cold, 0.0)
-        for n in range(begin, end):
-            angles[n] = step(arm, state, x[n], dt[n], offset[n], factor[n])
-            outputs[n] = output(arm, state)
-            inputs[n] = last_input(arm.wires.table, state.memories[0])
+        samples, hot = 0, cold
+        if not math.isnan(cold):
+            start(arm, state)
+            samples, hot = _cooling(arm, state, cold)
+        # One call for all: a step is compiled into where it is called.
+        for n in range(begin - samples, end):
+            if n < begin:
+                now, passed, added, shrunk = cold, np.inf, held, 1.0
+                if n < begin - 1:
+                    share = (n - begin + samples) / COOLING
+                    now = max(hot + share * (cold - hot), cold)
+            else:
+                now, passed, added, shrunk = x[n], dt[n], offset[n], factor[n]
+            angle = step(arm, state, now, passed, added, shrunk)
+            if n < begin:
+                rest = angle
+            else:
+                angles[n] = angle
+                outputs[n] = output(arm, state)
+                inputs[n] = last_input(arm.wires.table, state.memories[0])
         begin = end
     return rest, angles, outputs, inputs
