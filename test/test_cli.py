@@ -206,8 +206,8 @@ def test_simulate_takes_another_constitutive_model(tmp_path, capsys):
     usual, other = (Path(f'{tmp_path}/{muscle}/length.csv').read_text()
                     for muscle in ('grains', 'lagoudas'))
     assert usual != other and usual.splitlines()[0] == other.splitlines()[0]
-    assert 'there are grains, brinson, lagoudas' in failed(
-        ['simulate', 'bench', '-o', f'{tmp_path}/x', '--muscle', 'tanaka'], capsys)
+    assert 'there are grains, brinson, lagoudas, tanaka' in failed(
+        ['simulate', 'bench', '-o', f'{tmp_path}/x', '--muscle', 'auricchio'], capsys)
     assert 'a brinson muscle cannot have r_phase' in failed(
         ['simulate', 'bench', '-o', f'{tmp_path}/x', '--muscle', 'brinson', '--effect', 'r_phase'],
         capsys)

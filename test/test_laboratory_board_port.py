@@ -92,8 +92,8 @@ def test_strengths_that_no_effect_has_are_refused_before_opening():
 def test_the_muscle_of_the_url_is_the_arms():
     plant = make_plant(parse_url('sim://bicep?muscle=lagoudas'))
     assert plant.material.name == 'lagoudas'
-    with pytest.raises(ParameterError, match='there are grains, brinson, lagoudas'):
-        check_url('sim://bicep?muscle=tanaka')
+    with pytest.raises(ParameterError, match='there are grains, brinson, lagoudas, tanaka'):
+        check_url('sim://bicep?muscle=auricchio')
 
 
 def test_effects_reach_the_arm():

@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Wires of Brinson (1993) and of Lagoudas and others (2012) against numbers of their sources."""
+"""Wires of Brinson, of Lagoudas and others, and of Tanaka against numbers of their sources."""
 
 import math
 
@@ -11,6 +11,7 @@ from hysteresis_ros.laboratory.brinson import BrinsonMaterial
 from hysteresis_ros.laboratory.heat import ROOM
 from hysteresis_ros.laboratory.lagoudas import LagoudasMaterial
 from hysteresis_ros.laboratory.plant import specimen
+from hysteresis_ros.laboratory.tanaka import TanakaMaterial
 import numpy as np
 import pytest
 
@@ -18,7 +19,8 @@ HISTORY = st.lists(st.tuples(st.floats(0.0, 150.0), st.floats(0.0, 22.0)), max_s
 # Effects that are constants of the grains and that other equations do not have.
 REFUSED = {'grains': set(),
            'brinson': {'stress_dependent_strain', 'r_phase', 'formation_memory', 'cold_clamps'},
-           'lagoudas': {'r_phase', 'formation_memory', 'cold_clamps'}}
+           'lagoudas': {'r_phase', 'formation_memory', 'cold_clamps'},
+           'tanaka': {'stress_dependent_strain', 'r_phase', 'formation_memory', 'cold_clamps'}}
 
 
 def load(wire, temperature, stresses):
@@ -181,6 +183,113 @@ def test_lagoudas_inner_loops_wait_between_the_surfaces():
     assert warm(wire, [back + 3.0], 0.0)[0] < down - 0.05
 
 
+def test_tanaka_transformation_temperatures_without_load():
+    """At M_f = 5 degC 99 % are martensite and at A_f = 51 degC 1 %; half of each way is 10 %."""
+    wire = TanakaMaterial().wire()
+    wire.heat_and_cool(60.0, 0.0)
+    assert warm(wire, [23.0, 14.0, 5.0], 0.0) == pytest.approx([0.0, 0.9, 0.99])
+    wire.heat_and_cool(-80.0, 0.0)
+    assert warm(wire, [29.0, 40.0, 51.0], 0.0) == pytest.approx([1.0, 0.1, 0.01])
+
+
+def test_tanaka_pseudoelastic_plateaus_begin_at_the_slopes():
+    """
+    At 60 degC: martensite from 418.1 MPa on, 99 % at 621.5 MPa; back from 139.5 MPa, 1 % at 40.5.
+
+    11.3 MPa/K times (60 - 23) K and (60 - 5) K, and 4.5 MPa/K times (60 - 29) K and (60 - 51) K.
+    """
+    wire = TanakaMaterial().wire()
+    wire.heat_and_cool(60.0, 0.0)
+    start = wire.elongation(60.0, 0.0)
+    assert load(wire, 60.0, [418.0e6, 519.8e6, 621.5e6]) == pytest.approx([0.0, 0.9, 0.99])
+    assert load(wire, 60.0, [139.6e6, 90e6, 40.5e6, 0.0]) == pytest.approx(
+        [0.99, 0.099, 0.0099, 0.99 * 0.01 ** (31.0 / 22.0)])
+    assert wire.elongation(60.0, 0.0) == pytest.approx(start, abs=0.067 * 0.0015 * 0.27)
+
+
+def test_tanaka_shape_memory():
+    """Austenite at 26 degC, pulled by 237.3 MPa, keeps 99 % of 6.7 %; hot it loses them."""
+    # No thermal strain where it is measured.
+    material = TanakaMaterial(reference_temperature=26.0)
+    wire = material.wire()
+    wire.heat_and_cool(26.0, 0.0)
+    before = wire.elongation(26.0, 0.0)
+    assert load(wire, 26.0, [33.8e6, 237.3e6, 0.0]) == pytest.approx([0.0, 0.99, 0.99])
+    kept = (wire.elongation(26.0, 0.0) - before) / material.resting_length
+    assert kept == pytest.approx(0.99 * 0.067)
+    warm(wire, [100.0, 26.0], 0.0)
+    assert wire.elongation(26.0, 0.0) == pytest.approx(before, abs=1e-8)
+
+
+def test_tanaka_strain_is_the_same_whatever_the_load():
+    """All martensite has 6.7 %, also without load; what else a load does is elastic."""
+    material = TanakaMaterial()
+    wire = material.wire()
+    for stress in (0.0, 50e6, 200e6):
+        lengths = []
+        for temperature, modulus in ((300.0, 30e9), (-80.0, 13e9)):
+            wire.heat_and_cool(temperature, stress * material.section)
+            elastic = (stress - 0.55e6 * (temperature - 22.0)) / modulus
+            lengths.append(wire.elongation(temperature, stress * material.section)
+                           - elastic * material.resting_length)
+        assert lengths[1] - lengths[0] == pytest.approx(0.067 * material.resting_length, rel=1e-4)
+
+
+def test_tanaka_slopes_differ_in_the_two_directions():
+    """C_A = 4.5 MPa/K and C_M = 11.3 MPa/K."""
+    for heating, slope in ((True, 4.5e6), (False, 11.3e6)):
+        low, high = (half_way(TanakaMaterial(), stress, heating) for stress in (100e6, 150e6))
+        assert 50e6 / (high - low) == pytest.approx(slope, rel=1e-3)
+
+
+def test_tanaka_inner_loops_close_inside_the_outer_one():
+    """Between 18 and 36 degC each cycle goes less far beyond the last, to where it repeats."""
+    wire = TanakaMaterial().wire()
+    forth, back = np.arange(18.0, 36.1, 1.0), np.arange(36.0, 17.9, -1.0)
+    wire.heat_and_cool(100.0, 0.0)
+    cooled = dict(zip(back, warm(wire, back, 0.0)))
+    wire.heat_and_cool(-80.0, 0.0)
+    heated = dict(zip(forth, warm(wire, forth, 0.0)))
+    wire.heat_and_cool(18.0, 0.0)
+    turns = [wire.martensite]
+    for _ in range(30):
+        for temperatures in (forth, back):
+            shares = warm(wire, temperatures, 0.0)
+            for temperature, share in zip(temperatures, shares):
+                assert cooled[temperature] - 1e-12 <= share <= heated[temperature] + 1e-12
+        turns.append(shares[-1])
+    steps = np.abs(np.diff(turns))
+    assert steps[0] > 0.04 and np.all(steps[1:] <= 0.3 * steps[:-1] + 1e-12)
+    # What a whole cycle leaves: 1 - xi = (1 - xi exp(back)) exp(forth), by hand.
+    formed, left = 0.01 ** (5.0 / 18.0), 0.01 ** (7.0 / 22.0)
+    assert turns[-1] == pytest.approx((1.0 - formed) / (1.0 - left * formed))
+
+
+@settings(max_examples=60, deadline=None)
+@given(HISTORY)
+def test_tanaka_shares_stay_between_zero_and_one_and_follow_the_direction(history):
+    """Warmer under the same load never makes martensite, colder never austenite."""
+    wire = specimen(3, 'tanaka').wire()
+    last = (22.0, wire.material.pretension)
+    for temperature, tension in history:
+        wire.commit(last[0], tension)
+        before = wire.martensite
+        wire.commit(temperature, tension)
+        assert 0.0 <= wire.martensite <= 1.0
+        assert (wire.martensite - before) * (temperature - last[0]) <= 0.0
+        last = (temperature, tension)
+
+
+def test_tanaka_lines_do_not_cross():
+    """With C_A above C_M, too, heating never makes martensite and cooling never austenite."""
+    wire = TanakaMaterial(austenite_slope=13.8e6, martensite_slope=8e6).wire()
+    wire.heat_and_cool(20.0, 700e6 * wire.material.section)
+    temperatures = np.arange(20.0, 200.0, 1.0)
+    up, down = warm(wire, temperatures, 700e6), warm(wire, temperatures[::-1], 700e6)
+    assert np.all(np.diff(up) <= 0.0) and np.all(np.diff(down) >= 0.0)
+    assert (up[0], up[-1], down[-1]) == pytest.approx((1.0, 0.0, 1.0), abs=1e-6)
+
+
 @pytest.mark.parametrize('muscle', MUSCLES)
 @settings(max_examples=30, deadline=None)
 @given(history=HISTORY, temperature=st.floats(10.0, 140.0), tension=st.floats(0.0, 20.0),
@@ -244,7 +353,7 @@ def test_the_load_while_cooling_is_remembered_by_lagoudas_and_not_by_grains():
 
 def test_experiments_with_another_muscle():
     """The tables have the columns and loads of the grains' and differ in what is measured."""
-    for muscle in ('brinson', 'lagoudas'):
+    for muscle in ('brinson', 'lagoudas', 'tanaka'):
         tables, usual = (experiment_tables('bench', seed=2, muscle=kind)
                          for kind in (muscle, 'grains'))
         np.testing.assert_array_equal(tables['length.csv']['force'], usual['length.csv']['force'])
@@ -252,8 +361,8 @@ def test_experiments_with_another_muscle():
         np.testing.assert_array_equal(tables['length.csv']['length'],
                                       again['length.csv']['length'])
         assert np.ptp(tables['length.csv']['length'] - usual['length.csv']['length']) > 2e-3
-    with pytest.raises(ParameterError, match='no muscle .tanaka.; there are grains, brinson'):
-        experiment_tables('bench', muscle='tanaka')
+    with pytest.raises(ParameterError, match='no muscle .auricchio.; there are grains, brinson'):
+        experiment_tables('bench', muscle='auricchio')
 
 
 def test_slopes_and_strain_growth_can_be_scaled():
@@ -262,7 +371,7 @@ def test_slopes_and_strain_growth_can_be_scaled():
     grown = material.with_strain_growth(1.5)
     assert grown.strain_of_new_martensite(0.0) == material.strain_of_new_martensite(0.0)
     assert grown.saturated_strain - grown.least_strain == pytest.approx(1.5 * 0.0163)
-    for kind in (LagoudasMaterial, BrinsonMaterial):
+    for kind in (LagoudasMaterial, BrinsonMaterial, TanakaMaterial):
         scaled, usual = kind().with_slopes(0.5), kind()
         for heating in (True, False):
             near, far = (half_way(one, 300e6, heating) - half_way(one, 200e6, heating)
@@ -279,3 +388,12 @@ def test_steps_in_temperature_are_fine_enough(muscle, monkeypatch):
         monkeypatch.setattr(kind, 'temperature_step', kind.temperature_step / finer)
         angles.append(Plant(2, muscle=muscle).arm_trial(voltages)['angle'])
     assert np.degrees(np.abs(angles[0] - angles[1]).max()) < 0.08
+
+
+def test_tanaka_needs_no_steps_in_temperature(monkeypatch):
+    """What the load does along a way leaves no trace: steps of 1 K move the arm by no count."""
+    voltages = [0.0, 4.5, 3.6, 5.0, 3.2, 6.0, 4.0, 4.8, 0.0]
+    whole = Plant(2, muscle='tanaka').arm_trial(voltages)['angle']
+    monkeypatch.setattr(TanakaMaterial, 'temperature_step', 1.0)
+    fine = Plant(2, muscle='tanaka').arm_trial(voltages)['angle']
+    assert np.abs(whole - fine).max() < 2.0 * math.pi / 8192.0

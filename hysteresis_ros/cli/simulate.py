@@ -25,8 +25,9 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         metavar='NAME[=STRENGTH]',
                         help='hide an effect; strength 1 is strong (default), 0.4 weak')
     parser.add_argument('--muscle', default='grains', metavar='MODEL',
-                        help='constitutive model of the wires: grains (default), brinson or '
-                        'lagoudas; for the bench also mckibben (driven by pressure) or scp')
+                        help='constitutive model of the wires: grains (default), brinson, '
+                        'lagoudas or tanaka; for the bench also mckibben (driven by pressure) or '
+                        'scp')
     parser.add_argument('--seed', type=seed, default=0,
                         help='of specimen, noise and random sequences')
     return parser

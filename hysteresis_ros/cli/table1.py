@@ -25,8 +25,8 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         help='also the two-stage model with effects: those that the bench proves '
                         '(auto), or those named (default: none)')
     parser.add_argument('--muscle', default='grains', metavar='MODEL',
-                        help='grains (default), brinson, lagoudas, or a muscle that is no wire, '
-                        'and has no arm: mckibben, scp')
+                        help='grains (default), brinson, lagoudas, tanaka, or a muscle that is no '
+                        'wire, and has no arm: mckibben, scp')
     parser.add_argument('--jobs', type=count, default=1, metavar='N',
                         help='processes for the search of effects (default: 1)')
     add_json(parser)

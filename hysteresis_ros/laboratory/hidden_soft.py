@@ -72,7 +72,8 @@ def with_effects(material: SoftMaterial, effects: Mapping[str, float], seed: int
             known = f'it can have {", ".join(possible)}; ' if possible else ''
             raise ParameterError(
                 f'laboratory: a {material.name} muscle cannot have {name}: {known}most effects '
-                'are those of shape memory wires; choose one of grains, brinson, lagoudas')
+                'are those of shape memory wires; choose one of grains, brinson, lagoudas, '
+                'tanaka')
         if not (math.isfinite(strength) and 0.0 <= strength <= 2.0):
             raise ParameterError(f'laboratory: the strength of {name} has to be from 0 to 2, not '
                                  f'{strength!r}')

@@ -36,6 +36,7 @@ from hysteresis_ros.laboratory.lagoudas import LagoudasMaterial
 from hysteresis_ros.laboratory.mckibben import McKibbenMaterial
 from hysteresis_ros.laboratory.scp import ScpMaterial
 from hysteresis_ros.laboratory.soft_bench import SoftBench
+from hysteresis_ros.laboratory.tanaka import TanakaMaterial
 from hysteresis_ros.laboratory.wire import Material
 from hysteresis_ros.spelling import unknown
 
@@ -45,7 +46,8 @@ if TYPE_CHECKING:
 # Time constants of Eq. 1 [s]: in the paper, and in continuous recordings.
 PAPER, BRISK = 5.0, 0.02
 # Constitutive models of the wire.
-MUSCLES = {kind.name: kind for kind in (GrainMaterial, BrinsonMaterial, LagoudasMaterial)}
+MUSCLES = {kind.name: kind for kind in (
+    GrainMaterial, BrinsonMaterial, LagoudasMaterial, TanakaMaterial)}
 # Muscles that are no wires; they are on the bench only.
 SOFT_MUSCLES = {kind.name: kind for kind in (McKibbenMaterial, ScpMaterial)}
 

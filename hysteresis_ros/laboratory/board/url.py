@@ -12,7 +12,7 @@ key             meaning
 =============== ===================================================================================
 speed           how much faster than the wall's clock the arm lives (0.01 to 1000; 1)
 seed            which specimen of arm and wire, and all that is random (0)
-muscle          constitutive model of the wires: grains, brinson or lagoudas (grains)
+muscle          constitutive model of the wires: grains, brinson, lagoudas or tanaka (grains)
 recording       which recording on that specimen: another one has other noise (0)
 recording_time  how long it takes, about, in s, for effects that are slow or rare (900)
 effects_after   time in s at which the effects begin (0: from the start)
