@@ -12,6 +12,9 @@ PYTEST_ARGS ?=
 FUZZ_ARGS ?=
 RUNS ?= 1000000
 
+# With it each of some thousand processes would compile the package's sources anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 # The wheels of ROS 2 set this variable, and with it the library path, for one environment only.
 ifdef _ROS_WHEELS_BOOTSTRAP_COMPLETE
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH
