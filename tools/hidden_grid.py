@@ -153,6 +153,10 @@ def run(case: Case, model, settings=None) -> Row:
               'seconds': time.perf_counter() - started,
               'top': [(row['effect'], round(row['rmse_after'], 5), round(row['p_value'], 3))
                       for row in found.ranking[:4]]}
+    if group == 'pair' and not set(effects) <= reported:
+        # What the two explain, where nothing else may be named.
+        result['rmse_of_truth'] = diagnose(
+            model, [train], list(effects), seed=seed, settings=settings or Settings()).rmse_after
     if group in ('strong', 'weak') and found.missing:
         tables = experiment_tables(protocol, {}, seed, muscle)
         clean = Measurement.from_columns(tables['test.csv'])
