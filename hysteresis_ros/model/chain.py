@@ -206,8 +206,7 @@ class Chain:
 
     def load_inside(self, load: Values) -> Values:
         """Return the load as the transformation feels it."""
-        shifted = load + sum(
-            effect.shift_load(load, self.surroundings) for effect in self._shifting)
+        shifted = load + self._shift(load)
         share = sum(effect.follows_strain for effect in self.material)
         if share == 0.0:
             return shifted
@@ -227,10 +226,23 @@ class Chain:
         """Whether the loop's width depends on the load."""
         return bool(self._playing)
 
+    def _shift(self, load: Values) -> Values:
+        return sum((effect.shift_load(load, self.surroundings) for effect in self._shifting),
+                   0.0 * load)
+
     def loop_width(self, load: Values) -> Values:
-        """Return w(F), by which the loop is wider than that of H2, at least 0."""
-        return np.maximum(sum((effect.loop_width(load, self.surroundings)
-                               for effect in self._playing), 0.0 * load), 0.0)
+        """
+        Return w(F), by which the loop is wider than that of H2, at least 0.
+
+        Where a load shifts the transformation further than on the bench, it does so in both
+        directions: what it adds to the width, their difference, grows by the same factor.
+        """
+        width = sum((effect.loop_width(load, self.surroundings) for effect in self._playing),
+                    0.0 * load)
+        if self._shifting and self._playing:
+            mean = self.surroundings.load
+            width = width * (1.0 + (self._shift(mean) - self._shift(0.0)) / mean)
+        return np.maximum(width, 0.0)
 
     def scale(self, load: Values) -> Values:
         """Return S(F), the factor on the transformation strain."""
