@@ -156,6 +156,32 @@ def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
     assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
 
 
+def test_the_way_done_counts_only_drives_that_the_response_follows():
+    drive = np.array([0.0, 1.0, 2.0, 4.0, 2.0, 1.0, 0.0])
+    trial = np.zeros(7, dtype=int)
+    flat_to_one = np.array([5.0, 5.0, 8.0, 14.0, 8.0, 5.0, 5.0])
+    found = discrepancy.way_done(drive, flat_to_one, trial)
+    assert found == pytest.approx(np.array([0.0, 0.0, 3.0, 9.0, 3.0, 0.0, 0.0]) / 9.0)
+    # Where it follows everywhere alike, it is the drive itself.
+    even = discrepancy.way_done(drive, -3.0 * drive, trial)
+    assert even == pytest.approx(drive / 4.0)
+    # Both branches of a loop count: here one moves below 2 and one above.
+    loop = discrepancy.way_done(np.array([0.0, 2.0, 4.0, 2.0, 0.0]),
+                                np.array([0.0, 0.0, 6.0, 6.0, 0.0]), np.zeros(5, dtype=int))
+    assert loop == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
+
+
+def test_the_way_of_a_held_drive_lies_beside_it_and_none_between_trials():
+    drive, trial = np.array([0.0, 1.0, 1.0, 2.0, 3.0]), np.zeros(5, dtype=int)
+    late = discrepancy.way_done(drive, np.array([0.0, 0.0, 4.0, 4.0, 4.0]), trial)
+    assert late == pytest.approx([0.0, 0.5, 0.5, 1.0, 1.0])
+    apart = discrepancy.way_done(np.array([0.0, 1.0, 3.0, 4.0]), np.array([0.0, 1.0, 9.0, 10.0]),
+                                 np.array([0, 0, 1, 1]))
+    assert apart == pytest.approx([0.0, 0.5, 0.5, 1.0])
+    for drive in (np.ones(4), np.arange(4.0)):
+        assert not np.any(discrepancy.way_done(drive, np.ones(4), np.zeros(4, dtype=int)))
+
+
 def test_what_martensite_may_keep_of_its_load_is_part_of_the_discrepancy():
     """As an error of the length, where the strain grows with a load that moves."""
     model = bicep_model()
@@ -184,13 +210,14 @@ def test_what_may_be_kept_is_no_discrepancy_where_it_is_an_effect(fitted):
     assert np.diag(found.matrix()) == pytest.approx((0.0004 * gain) ** 2 + history.path ** 2)
 
 
-def test_errors_of_rows_that_are_near_in_drive_and_response_are_alike(problem):
+def test_errors_of_rows_that_are_near_on_the_way_and_in_response_are_alike(problem):
     """More so on the same way of the drive than on the way back."""
     predicted, settings = problem.simulate([]), Settings()
     found = discrepancy.discrepancy_along(problem, [], predicted, settings).matrix()
     size = np.sqrt(np.diag(found))
     drive, direction = problem.signals['drive'], problem.signals['direction'] > 0.0
-    gap = np.hypot((drive[:, None] - drive) / np.ptp(drive),
+    way = discrepancy.way_done(drive, predicted, problem.trial)
+    gap = np.hypot(way[:, None] - way,
                    (predicted[:, None] - predicted) / np.ptp(predicted)) / settings.correlation
     # The part that differs between the directions is half of the common one: 1 - 1/4 to 1 + 1/4.
     same = np.where(direction[:, None] == direction[None, :], 1.0, 0.6)

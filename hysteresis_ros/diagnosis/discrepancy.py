@@ -5,10 +5,11 @@ Discrepancy of the base model: how wrong it is by itself, as a covariance of an 
 
 It is known before the arm moves. The bench says how large the error of the length is under each
 load, on trials or loads that were held out; on the arm it shows as an error of the angle that is
-alike at neighbouring drives and responses and differs between the directions of the drive. And the
-bench holds the load still, while an arm's load moves with the wire: what a load does in the middle
-of a transformation the bench cannot tell. Models that agree on every bench table bound that
-(`load_history`); but where one of them is an effect that is tried, it speaks for itself.
+alike at neighbouring responses and at drives between which the response does little, and differs
+between the directions of the drive. And the bench holds the load still, while an arm's load moves
+with the wire: what a load does in the middle of a transformation the bench cannot tell. Models that
+agree on every bench table bound that (`load_history`); but where one of them is an effect that is
+tried, it speaks for itself.
 """
 
 from __future__ import annotations
@@ -181,7 +182,39 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     formation = np.zeros(len(predicted)) if known else gain * history.formation
     return Discrepancy(
         np.column_stack([bench, DIRECTIONAL * direction * bench, history.path, formation]),
-        np.column_stack([_unit(drive), _unit(predicted)]) / settings.correlation)
+        np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])
+        / settings.correlation)
+
+
+def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.ndarray:
+    """
+    Return for each row the share of the response's way that is done below its drive, from 0 to 1.
+
+    Each change from row to row counts evenly over the drives between the two, or, while the drive
+    is held, over those next to it.
+
+    Parameters
+    ----------
+    drive, response : ndarray, shape (n,)
+    trial : ndarray of int, shape (n,)
+        Trial of each row.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        All 0 where nothing moves.
+    """
+    levels, place = np.unique(drive, return_inverse=True)
+    low, high = (edge(place[:-1], place[1:]) for edge in (np.minimum, np.maximum))
+    held, last = low == high, len(levels) - 1
+    low, high = np.maximum(low - held, 0), np.minimum(high + held, last)
+    way = np.where(np.diff(trial) == 0, np.abs(np.diff(response)), 0.0)
+    share = way / np.maximum(levels[high] - levels[low], 1e-300)
+    slope = np.zeros(len(levels))
+    np.add.at(slope, low, share)
+    np.add.at(slope, high, -share)
+    done = np.cumsum(np.cumsum(slope)[:-1] * np.diff(levels))
+    return _unit(np.append(0.0, done))[place]
 
 
 def _unit(values: np.ndarray) -> np.ndarray:

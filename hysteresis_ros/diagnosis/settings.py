@@ -28,8 +28,8 @@ class Settings:
         Spread (natural logarithm) of the discrepancy's size against that seen on the bench,
         because the arm goes other ways than the bench: a third.
     correlation : float
-        Shortest length over which the discrepancy changes, as a share of the range of drive and
-        response: about one cell of the bench's grid of weights.
+        Shortest length over which the discrepancy changes, as a share of the response's range and
+        of its way over the drives: about one cell of the bench's grid of weights.
     practical : float
         Smallest reduction of the RMSE that matters to a user.
     form : float
