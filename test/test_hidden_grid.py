@@ -65,16 +65,16 @@ def test_truth_of_the_most_probable_set(scores):
             assert scores.most_probable(row) == (0.9, effects == right)
 
 
-def test_a_pair_missed_counts_apart_where_as_few_effects_explain_as_much(scores):
-    def pair(missing, after, **more):
+def test_a_pair_missed_counts_apart_where_as_few_effects_predict_as_well(scores):
+    def pair(missing, **more):
         return {**result('pair', ['creep', 'slack'], []), 'missing': missing, 'reported': missing,
-                'rmse_after': after, **more}
-    rows = [pair(['creep', 'slack'], 2.0), pair(['creep'], 1.04, rmse_of_truth=1.0),
-            pair(['creep'], 1.06, rmse_of_truth=1.0), pair([], 1.0, rmse_of_truth=1.0),
-            pair(['backlash', 'inertia', 'latency'], 1.0, rmse_of_truth=1.0)]
+                **more}
+    rows = [pair(['creep', 'slack']), pair(['creep'], unseen=1.04, unseen_of_truth=1.0),
+            pair(['creep'], unseen=1.06, unseen_of_truth=1.0), pair([]),
+            pair(['backlash', 'inertia', 'latency'], unseen=1.0, unseen_of_truth=1.0)]
     found = scores.score(rows)
     assert found['both of a pair found [%]'][:2] == (20.0, 5)
-    assert found['both found, or as few that explain as much [%]'][:2] == (40.0, 5)
+    assert found['both found, or as few that predict as well [%]'][:2] == (40.0, 5)
 
 
 def test_reliability_counts_cases_in_bins(scores):

@@ -14,8 +14,8 @@ SINGLE = 'strong', 'weak'
 MARKS = '<!-- hidden effects: begin -->', '<!-- hidden effects: end -->'
 # Bins of the probabilities in the reliability table: name, and where each begins [%].
 BINS = {'<50': 0.0, '50-70': 50.0, '70-90': 70.0, '>=90': 90.0}
-# A set that leaves no more than this times what the truth leaves explains as much.
-AS_MUCH = 1.05
+# A set that leaves no more than this times what the truth leaves predicts as well.
+AS_WELL = 1.05
 # Earlier outputs do not name the muscle.
 FIRST_MUSCLE = 'grains'
 
@@ -43,9 +43,9 @@ def score(results: list[Row]) -> dict[str, tuple]:
     def both(row):
         return set(row['truth']) <= set(row['reported'])
 
-    def as_much(row):
-        return both(row) or (0 < len(row['missing']) <= len(row['truth'])
-                             and row['rmse_after'] <= AS_MUCH * row.get('rmse_of_truth', 0.0))
+    def as_well(row):
+        return both(row) or (0 < len(row['missing']) <= len(row['truth']) and
+                             row.get('unseen', 1.0) <= AS_WELL * row.get('unseen_of_truth', 0.0))
 
     single = [row for row in results if row['group'] in SINGLE]
     sizes = [len(row['reported']) for row in single if row['reported']]
@@ -64,7 +64,7 @@ def score(results: list[Row]) -> dict[str, tuple]:
             *share('unknown', lambda row: row['verdict'] == 'unknown'), 'at least 85'),
         'both of a pair found [%]': (
             *share('pair', both), 'at least 80'),
-        'both found, or as few that explain as much [%]': (*share('pair', as_much), ''),
+        'both found, or as few that predict as well [%]': (*share('pair', as_well), ''),
         'error on the unseen recording over that without effect, median': (
             float(np.median(ratios)) if ratios else None, len(ratios), 'at most 1.3'),
         'the same, share of cases within 1.3 [%]': (
