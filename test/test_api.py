@@ -123,6 +123,11 @@ def test_a_notebook_goes_from_the_bench_to_the_extended_model(folder, tmp_path):
     assert hr.predict(extended, test) == pytest.approx(test.column('angle'), abs=0.01)
 
 
+def test_a_model_is_shown_in_one_line(folder):
+    model = hr.identify(folder / 'length.csv', folder / 'force.csv').model
+    assert repr(model) == '<MuscleModel two-stage of voltage: no effects>'
+
+
 def test_read_returns_one_measurement_or_a_list(folder):
     """One path, one measurement."""
     one = hr.read(folder / 'train.csv')

@@ -95,6 +95,12 @@ def test_only_its_command_knows_the_studio(root):
         lambda name: name.startswith('hysteresis_ros.studio')) == []
 
 
+def test_identification_does_not_know_the_diagnosis(root):
+    """What the bench gives comes first."""
+    assert offenders(root, lambda module: not module.startswith('hysteresis_ros.identification'),
+                     lambda name: name.startswith('hysteresis_ros.diagnosis')) == []
+
+
 def test_the_serial_port_stays_in_the_bridge(root):
     """One place speaks to boards."""
     assert offenders(

@@ -178,8 +178,16 @@ def test_the_way_of_a_held_drive_lies_beside_it_and_none_between_trials():
     apart = discrepancy.way_done(np.array([0.0, 1.0, 3.0, 4.0]), np.array([0.0, 1.0, 9.0, 10.0]),
                                  np.array([0, 0, 1, 1]))
     assert apart == pytest.approx([0.0, 0.5, 0.5, 1.0])
-    for drive in (np.ones(4), np.arange(4.0)):
-        assert not np.any(discrepancy.way_done(drive, np.ones(4), np.zeros(4, dtype=int)))
+    still = np.zeros(4, dtype=int)
+    for drive, response in ((np.arange(4.0), np.ones(4)), (np.ones(4), np.arange(4.0))):
+        assert not np.any(discrepancy.way_done(drive, response, still))
+
+
+def test_drives_that_differ_by_rounding_are_one_on_the_way():
+    drive = np.array([0.0, 1.0, 2.0, np.nextafter(2.0, 3.0), 3.0])
+    response, trial = np.array([0.0, 1.0, 3.0, 6.0, 7.0]), np.zeros(5, dtype=int)
+    assert discrepancy.way_done(drive, response, trial) == pytest.approx(
+        discrepancy.way_done(np.round(drive, 3), response, trial))
 
 
 def test_what_martensite_may_keep_of_its_load_is_part_of_the_discrepancy():

@@ -21,6 +21,7 @@ from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import specimen
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import Simulator
+from hysteresis_ros.model.chain import Chain
 from model_support import (
     arm_run, bicep_model, effect_of, misses_of_targets, wandering_voltage)
 
@@ -50,6 +51,16 @@ def test_relays_switch_on_the_lines_of_both_directions(g):
             up.append(state == down)
         # Both begin cold; the first switch makes them one.
         assert all(up[10:])
+
+
+@pytest.mark.parametrize('g', [0.1, -0.1])
+def test_a_load_that_counts_more_widens_or_narrows_as_much_more(g):
+    model, loads = bicep_model(), np.array([0.0, 1.0, 3.0])
+    width = slopes(model, g).loop_width(loads, model.surroundings)
+    for shift in (-0.2, 0.0, 0.5):
+        more = effect_of(model, 'stress_dependence', shift=shift)
+        found = Chain([slopes(model, g), more], model.surroundings).loop_width(loads)
+        np.testing.assert_allclose(found, (1.0 + shift) * width)
 
 
 def test_width_grows_or_shrinks_with_the_load_and_is_never_negative():

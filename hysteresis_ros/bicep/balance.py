@@ -173,8 +173,8 @@ class ArmBalance:
     def settle(self, x: float, clock: float = 0.0, offset: float = 0.0) -> float:
         """Wipe the memory, take up the state of rest under `x`, and return its angle [rad]."""
         none = np.zeros(0)
-        return self._kernels.run(self._arm, self._state, float(x), float(offset), ONE_EMPTY_TRIAL,
-                                 none, none, none, none)[0]
+        return self._kernels.run(self._arm, self._state, True, float(x), float(offset),
+                                 ONE_EMPTY_TRIAL, none, none, none, none)[0]
 
     def step(self, x: float, dt: float, offset: float = 0.0, factor: float = 1.0,
              clock: float = 0.0) -> float:
@@ -222,13 +222,13 @@ class ArmBalance:
         angles, outputs, inputs : ndarray, shape (rows,)
             Angle [rad], output of H2 [m], and input of the first muscle's H2.
         """
-        return self._kernels.run(self._arm, self._state, float(cold), 0.0, ends, *(
+        return self._kernels.run(self._arm, self._state, True, float(cold), 0.0, ends, *(
             np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))
 
     def proceed(self, x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray,
                 clock: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Go on from the present state; angles, outputs and inputs (rows,) as of `run`."""
-        return self._kernels.run(self._arm, self._state, math.nan, 0.0, np.array([len(x)]), *(
+        return self._kernels.run(self._arm, self._state, False, 0.0, 0.0, np.array([len(x)]), *(
             np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))[1:]
 
 

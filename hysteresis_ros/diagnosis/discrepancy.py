@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # The error that differs between the directions of the drive, against the common one.
 DIRECTIONAL = 0.5
+# Decimals, in parts of its range, to which two drives differ.
+DRIVE_DECIMALS = 9
 # Of as many loads one lies between others, and tells what the model does between them.
 FEWEST_LOADS = 3
 
@@ -202,14 +204,19 @@ def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.n
     Returns
     -------
     ndarray, shape (n,)
-        All 0 where nothing moves.
+        All 0 where drive or response stand still.
     """
-    levels, place = np.unique(drive, return_inverse=True)
+    span = float(np.ptp(drive))
+    if span == 0.0:
+        return np.zeros(len(drive))
+    # Drives that differ by rounding are one.
+    levels, place = np.unique(np.round((drive - drive.min()) / span, DRIVE_DECIMALS),
+                              return_inverse=True)
     low, high = (edge(place[:-1], place[1:]) for edge in (np.minimum, np.maximum))
     held, last = low == high, len(levels) - 1
     low, high = np.maximum(low - held, 0), np.minimum(high + held, last)
     way = np.where(np.diff(trial) == 0, np.abs(np.diff(response)), 0.0)
-    share = way / np.maximum(levels[high] - levels[low], 1e-300)
+    share = way / (levels[high] - levels[low])
     slope = np.zeros(len(levels))
     np.add.at(slope, low, share)
     np.add.at(slope, high, -share)

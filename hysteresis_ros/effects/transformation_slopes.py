@@ -22,7 +22,8 @@ class TransformationSlopes(MaterialEffect):
     sentence = 'The load shifts heating and cooling by different amounts: loops widen or narrow.'
     equation = ('T_A = T_A0 + sigma / C_A, T_M = T_M0 + sigma / C_M: the input of H2 stays between '
                 'F - x - w and F - x, w = g F for g > 0, -g max(2 Fm - F, 0) for g < 0, '
-                "g = 1 - C_A / C_M, Fm the bench's mean load")
+                "g = 1 - C_A / C_M, Fm the bench's mean load; where stress_dependence has a shift, "
+                'w (1 + shift)')
     source = ('Brinson, J. Intell. Mater. Syst. Struct. 4 (1993) 229; Lagoudas (ed.), Shape Memory '
               'Alloys, Springer 2008, ch. 3')
     shows_in = "load, by the loop's width"

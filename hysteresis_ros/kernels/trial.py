@@ -89,7 +89,7 @@ def step(arm: Arm, state: State, x: float, dt: float, offset: float, factor: flo
     angle = motion[ANGLE]
     for _ in range(pieces):
         angle = _advance(arm, state, x, dt / pieces, offset, factor)
-    # What rings is not accelerated for a moment in the middle of its way.
+    # In the middle of a swing the acceleration is zero for a moment.
     motion[INERTIAL_RATIO] = max(arm.inertia * abs(motion[ACCELERATION]) / arm.heaviest,
                                  FADING ** pieces * motion[INERTIAL_RATIO])
     return angle
@@ -146,7 +146,7 @@ def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor:
 
 @inlined
 def _cooling(arm: Arm, state: State, x: float) -> tuple[int, float]:
-    """Return in how many samples a hot muscle cools down to the state of rest, and its x so hot."""
+    """Return in how many samples a hot muscle cools down to the state of rest, and x while hot."""
     if arm.wires.kept == 0.0:
         return 1, x
     # What forms on the way down remembers the loads that it meets there.
@@ -156,8 +156,8 @@ def _cooling(arm: Arm, state: State, x: float) -> tuple[int, float]:
 
 
 @jit
-def run(arm: Arm, state: State, cold: float, held: float, ends: np.ndarray, x: np.ndarray,
-        dt: np.ndarray, offset: np.ndarray, factor: np.ndarray
+def run(arm: Arm, state: State, begins: bool, cold: float, held: float, ends: np.ndarray,
+        x: np.ndarray, dt: np.ndarray, offset: np.ndarray, factor: np.ndarray
         ) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     """
     Run whole trials, each from the cold state, or go on from the present one.
@@ -165,8 +165,10 @@ def run(arm: Arm, state: State, cold: float, held: float, ends: np.ndarray, x: n
     Parameters
     ----------
     arm, state : Arm, State
+    begins : bool
+        Whether each trial begins in the cold state.
     cold : float
-        Output of the first stage in the cold state; NaN to go on from the present state.
+        Output of the first stage there.
     held : float
         Offset in the cold state [m]; see `step`.
     ends : ndarray of int, shape (trials,)
@@ -187,7 +189,7 @@ def run(arm: Arm, state: State, cold: float, held: float, ends: np.ndarray, x: n
     rest, begin = np.nan, 0
     for end in ends:
         samples, hot = 0, cold
-        if not math.isnan(cold):
+        if begins:
             start(arm, state)
             samples, hot = _cooling(arm, state, cold)
         # One call for all: a step is compiled into where it is called.

@@ -240,7 +240,7 @@ class Chain:
         width = sum((effect.loop_width(load, self.surroundings) for effect in self._playing),
                     0.0 * load)
         if self._shifting and self._playing:
-            mean = self.surroundings.load
+            mean = self.surroundings.load or 1.0
             width = width * (1.0 + (self._shift(mean) - self._shift(0.0)) / mean)
         return np.maximum(width, 0.0)
 

@@ -86,6 +86,11 @@ class MuscleModel:
     metrics: dict[str, Any] = dataclasses.field(default_factory=dict)
     provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Return kind, drive and effects in one line."""
+        effects = ', '.join(effect.id for effect in self.effects) or 'no effects'
+        return f'<MuscleModel {self.kind} of {self.drive}: {effects}>'
+
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> MuscleModel:
         """Read a model file; see `hysteresis_ros.model.files.load`."""
