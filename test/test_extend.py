@@ -56,6 +56,17 @@ def test_both_effects_get_the_values_of_the_arm(extension):
     assert extension.implausible == []
 
 
+def test_what_the_model_has_of_an_effect_acts_until_it_is_fitted_anew(base):
+    """Else a step before would show the error of a model without it."""
+    own = base.with_effects([effect_of(base, 'series_compliance', compliance=0.3)])
+    train = run_of(base.with_effects([effect_of(base, 'series_compliance', compliance=0.4),
+                                      effect_of(base, 'payload_error', dm=15.0)]), 1)
+    first, both = (extend(own, names, [train]).steps for names in (
+        ['payload_error'], ['payload_error', 'series_compliance']))
+    assert both[1] == (first[1][0], pytest.approx(first[1][1], rel=0.01))
+    assert both[2][1] < both[1][1] < both[0][1]
+
+
 def test_the_error_on_the_unseen_recording_falls_to_the_noise(extension, base, recordings):
     """Step by step: the base, one effect more, both."""
     assert extension.test['rmse_before'] == rmse(base, recordings[1:])

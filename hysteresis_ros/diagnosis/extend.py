@@ -14,7 +14,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.kind import problem_for
-from hysteresis_ros.diagnosis.observable import may_differ, observable, present
+from hysteresis_ros.diagnosis.observable import may_differ, observable, present, unaffected
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
@@ -215,7 +215,8 @@ def _gained(model: MuscleModel, problem: ArmProblem | BenchProblem,
     judged = list(test) or list(train)
     models = [('base', model)]
     for name, effects in stages:
-        models.append((name, problem.completed([*problem.model.effects, *effects])))
+        models.append((name, problem.completed(
+            [*unaffected(problem.model.effects, effects), *effects])))
     added = stages[-1][1]
     extended = _stamped(models[-1][1], added, train, problem.kind, by_hand)
     models[-1] = (models[-1][0], extended)
@@ -245,7 +246,7 @@ def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Mea
     added, _ = fits[-1]
     if problem.refits:
         added = _fitted_together(BenchFitter(problem.finer()), added, known)
-    completed = problem.completed([*problem.model.effects, *added])
+    completed = problem.completed([*unaffected(problem.model.effects, added), *added])
     return _stamped(completed, added, train, problem.kind), added
 
 
@@ -298,7 +299,7 @@ def undetermined(effect: Effect, kind: str) -> list[str]:
 
 def _fitted(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]
             ) -> tuple[ArmProblem | BenchProblem, list[type[Effect]], list[Fitted]]:
-    """Return the problem without the effects named, their classes, and the fit after each."""
+    """Return the problem, the classes of the effects named, and the fit after each."""
     problem, classes = _without(model, names, train)
     return problem, classes, (_on_bench(problem, model, classes) if problem.refits
                               else _on_arm(problem, model, classes))
@@ -306,9 +307,17 @@ def _fitted(model: MuscleModel, names: Sequence[str], train: Sequence[Measuremen
 
 def _without(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]
              ) -> tuple[ArmProblem | BenchProblem, list[type[Effect]]]:
-    """Return the problem without the effects named, and their classes."""
+    """
+    Return the problem and the classes of the effects named.
+
+    Without these effects, but on an arm what the model has of one acts until its turn.
+    """
     classes = _checked(problem_for(model, train), names)
     problem = problem_for(base_of(model, classes), train)
+    if not problem.refits:
+        replaced = {name for kind in classes for name in kind.replaces}
+        problem = problem_for(model.with_effects(
+            [one for one in model.effects if one.id not in replaced]), train)
     for kind in classes:
         if problem.kind not in kind.kinds:
             raise ParameterError(f'effect {kind.id} cannot be fitted to a {problem.kind} '
