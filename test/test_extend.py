@@ -115,7 +115,7 @@ def test_the_weights_of_the_bench_stay_as_they_are(extension, base):
 
 
 def test_a_second_extension_builds_on_the_first(base, recordings):
-    """The first stays as it was fitted, and the second explains a part of what is left."""
+    """The first stays as it was fitted, and the second explains a part of the residual."""
     train, test = recordings
     first = extend(base, ['payload_error'], [train], [test])
     second = extend(first.model, ['encoder_offset'], [train], [test])

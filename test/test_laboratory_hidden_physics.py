@@ -401,8 +401,8 @@ def test_events_come_as_often_as_asked():
 @pytest.fixture(scope='module')
 def clean():
     """Return a drive and the clean arm's answer to it [deg]."""
-    chance = np.random.default_rng(5)
-    voltages = np.concatenate((steps_of_all_speeds(chance, 120.0), repeated_loop(chance, 4)))
+    rng = np.random.default_rng(5)
+    voltages = np.concatenate((steps_of_all_speeds(rng, 120.0), repeated_loop(rng, 4)))
     return voltages, answer(voltages, {})
 
 

@@ -178,7 +178,7 @@ def test_nothing_found_is_a_page_too(case, tmp_path):
 
 
 def test_a_value_outside_its_range_is_warned_of(case, tmp_path):
-    """It stands in for something else."""
+    """It is an implausible explanation."""
     model, train, _, extension = case
     try:
         extension.implausible.append('payload_error.dm')

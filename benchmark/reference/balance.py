@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from benchmark.reference.bundle import Bundle, COMPLIANCE, USUAL_YIELD
+from benchmark.reference.bundle import Bundle, COMPLIANCE, TYPICAL_COMPLIANCE
 from hysteresis_ros.bicep.geometry import BicepGeometry
 from benchmark.reference.root import bracket, illinois
 from benchmark.reference.swing import Swing
@@ -81,7 +81,7 @@ class ArmBalance:
         self._bundle = None
         if len(chain.offsets) > 1:
             self._bundle = Bundle(operator, chain.offsets, chain.compliance())
-            # Whose wires yield when the drive changes, even while the arm sticks.
+            # Whose wires stretch when the drive changes, even while the arm sticks.
             self._rigid = False
         self.operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self._swing = None
@@ -296,7 +296,7 @@ class ArmBalance:
             k, share = self._present()
             near = k - 1 + share
         # Along the grid the muscles give way by about this much.
-        scale = USUAL_YIELD * last / (line.demand[-1] - line.demand[0])
+        scale = TYPICAL_COMPLIANCE * last / (line.demand[-1] - line.demand[0])
         place, inputs = self._bundle.settle(state, x, 0.0, last, near, scale)
         self._commit(inputs)
         return split(place)

@@ -17,7 +17,7 @@ from benchmark.reference.preisach import Preisach
 # Compliance [m/N] of a wire whose own is not known.
 COMPLIANCE = 2e-4
 # About how far muscles go for a load that is missing [m/N], to begin a search with.
-USUAL_YIELD = 1e-3
+TYPICAL_COMPLIANCE = 1e-3
 
 
 class Bundle:
@@ -31,7 +31,7 @@ class Bundle:
     offsets : tuple of float
         Excess length dL_i [m] of each muscle.
     compliance : float
-        What a wire yields elastically [m/N]; 0 stands for a usual wire's.
+        Elastic compliance of a wire [m/N]; 0 for a typical wire's.
     """
 
     def __init__(self, operator, offsets, compliance: float = 0.0):

@@ -5,8 +5,8 @@ One step of an arm in motion.
 
 The muscle pulls with what the arm asks for at rest, less what friction and inertia take:
 ``n F r(theta) = tau(theta) - tau_c - b dtheta/dt - I d2theta/dt2``. It gives way as always, so a
-jerk also stretches what is elastic in it, and an arm that swings faster than its muscle shortens
-leaves the muscle loose.
+sudden acceleration also stretches what is elastic in it, and an arm that swings faster than its
+muscle shortens leaves the muscle loose.
 """
 
 import bisect
@@ -14,7 +14,7 @@ import bisect
 import numpy as np
 from scipy import optimize
 
-from benchmark.reference.bundle import USUAL_YIELD
+from benchmark.reference.bundle import TYPICAL_COMPLIANCE
 from benchmark.reference.root import bracket, illinois
 
 # Loads of the muscle's table, up to this many times the largest at rest.
@@ -123,7 +123,7 @@ class Swing:
         u = operator.input
         here = lacking(u)
         if here != 0.0:
-            points = bracket(lacking, u, here, here / USUAL_YIELD, self._inside[0] - x,
+            points = bracket(lacking, u, here, here / TYPICAL_COMPLIANCE, self._inside[0] - x,
                              self._inside[-1] - x)
             u = points[2]
             if points[1] * points[3] < 0.0:

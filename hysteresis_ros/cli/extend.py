@@ -124,7 +124,7 @@ def to_text(extension: Extension, response: str) -> str:
     for effect in extension.added:
         lines.append(f'+ {effect.id}: {parameters_in_words(effect.to_dict()["parameters"])}')
     for name in extension.implausible:
-        lines.append(f'! {name} is outside its physical range: it stands in for something else')
+        lines.append(f'! {name} is outside its physical range: an implausible explanation')
     for label, errors in (('fitted', extension.train), ('not fitted', extension.test)):
         if errors:
             lines.append(f'RMSE on data {label}: {factor * errors["rmse_before"]:.3g} {unit} -> '

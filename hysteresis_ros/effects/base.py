@@ -38,7 +38,7 @@ class Parameter:
     name, unit, description : str
         Name, unit and meaning.
     low, high : float
-        Plausible range; an estimate outside it stands in for something else.
+        Plausible range; an estimate outside it is an implausible explanation.
     neutral : float
         The value at which the effect vanishes.
     starts : tuple of float
