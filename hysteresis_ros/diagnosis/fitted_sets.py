@@ -143,7 +143,7 @@ class FittedSets:
         return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
 
     def uneven(self, names: frozenset[str]) -> bool:
-        """Whether the residual of a set looks like noise, but has a cause: see `noise_free_rmse`."""
+        """Whether a set's residual looks like noise, but has a cause: see `noise_free_rmse`."""
         return (self.fits[names].noise > self.rmse_95
                 and self._noise_p_value(names) <= NOISE_SIGNIFICANCE)
 
