@@ -47,6 +47,8 @@ EXPECTED = {
     'series_compliance': ('material', 'force', 'weights', {'payload_error', 'geometry_error'}),
     'transformation_slopes': ('material', "loop's width", 'three or more loads',
                               {'stress_dependence', 'r_phase'}),
+    'phase_modulus': ('material', 'cold side', 'four or more loads',
+                      {'stress_dependent_strain', 'series_compliance'}),
     'formation_memory': ('material', 'heating against cooling', 'change its payload',
                          {'stress_dependent_strain', 'backlash'}),
     'overload': ('material', 'first time', 'step by step',

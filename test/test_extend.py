@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.cli.main import main
-from hysteresis_ros.diagnosis.extend import extend, rmse, undetermined
+from hysteresis_ros.diagnosis.determined import undetermined
+from hysteresis_ros.diagnosis.extend import extend, rmse
 from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.measurements import Measurement, write_csv
 from hysteresis_ros.model import MuscleModel

@@ -10,7 +10,7 @@ import pytest
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
-from hysteresis_ros.diagnosis.extend import undetermined
+from hysteresis_ros.diagnosis.determined import undetermined
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.parameters import ParameterVector
 from hysteresis_ros.identification.bench import identify

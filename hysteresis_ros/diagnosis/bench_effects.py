@@ -4,16 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.diagnosis.extend import extended_model, undetermined
+from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
@@ -69,17 +71,17 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     ParameterError
         If an effect is unknown, named twice, already there, or cannot show in a bench table.
     """
-    rows, known = choose_trials(length, length_trials, 'length'), []
+    rows = choose_trials(length, length_trials, 'length')
     if not rows.any():
         raise IdentificationError('no trial is left to fit')
     fitted = length.select(sorted(set(length.column('trial')[rows].tolist())))
     if names is None:
         found = diagnose(model, [fitted], jobs=jobs, progress=progress).effects
-        known = _with_universal(model, found, fitted)
-        names = [effect.id for effect in known]
-    if not names:
+        extended, added = _determined(model, found, fitted)
+    elif names:
+        extended, added = extended_model(model, names, [fitted])
+    else:
         return model, []
-    extended, added = extended_model(model, names, [fitted], known)
     metrics = measure(extended, force, force_trials, length, length_trials)
     # The errors of loads left out of the last fit of the weights stay with the new ones.
     for name, entry in metrics.items():
@@ -87,8 +89,26 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     return dataclasses.replace(extended, metrics=metrics), added
 
 
-def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
-                    ) -> list[Effect]:
+def _determined(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
+                ) -> tuple[MuscleModel, list[Effect]]:
+    """Return the model with the effects found and usual, all of them determined by the rows."""
+    excluded: list[str] = []
+    while True:
+        known = _with_universal(
+            model, [effect for effect in found if effect.id not in excluded], fitted, excluded)
+        if not known:
+            return model, []
+        extended, added = extended_model(model, [one.id for one in known], [fitted], known)
+        vague = [effect for effect in added if effect.implausible()
+                 or not_determined(effect, 'bench')]
+        if not vague:
+            return extended, added
+        # What every loaded muscle has goes last.
+        excluded.append(min(vague, key=lambda effect: effect.universal).id)
+
+
+def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measurement,
+                    excluded: Collection[str] = ()) -> list[Effect]:
     """
     Return the effects found, and those that every loaded muscle has where they do no harm.
 
@@ -100,28 +120,40 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
     fitter = BenchFitter(BenchProblem(model, [fitted]).finer())
     names = [effect.id for effect in found]
     rest = usual([kind(model.surroundings) for name, kind in catalogue().items()
-                  if kind.universal and name not in names and kind.available(model.surroundings)],
+                  if kind.universal and name not in (*names, *excluded)
+                  and kind.available(model.surroundings)],
                  'bench')
     if not rest:
         return list(found)
 
+    def held_out(fit: Fit) -> float:
+        return fitter.error(fitter.cross_validate(fit).held_out)
+
     def tried(effects: Sequence[Effect]) -> tuple[float, list[Effect]]:
         fit = fitter.fit(effects)
         fitted_effects = fitter.with_intervals(fit)
-        vague = [one for one in fitted_effects[len(found):] if undetermined(one, 'bench')]
-        # Where no effect explains the load, held-out loads would tell of what is missing.
-        if fit.implausible() or len(vague) > (1 if found else 0):
+        vague = [one for one in fitted_effects if not_determined(one, 'bench')
+                 and (one.universal or one.id not in names)]
+        # Where no effect explains the load, held-out loads would tell of what is missing. And what
+        # was found is not to be given up for what could stand for it.
+        if (fit.implausible() or len(vague) > (1 if found else 0)
+                or any(one.id in names for one in vague)):
             return np.inf, fitted_effects
         if vague:
             others = [one for one in fit.effects if one.id != vague[0].id]
             return located(fitter, others, vague[0], practical) or (np.inf, fitted_effects)
-        return fitter.error(fitter.cross_validate(fit).held_out), fitted_effects
+        return held_out(fit), fitted_effects
 
     # Alone they have to help; together with one that was found they only must not harm.
     practical = Settings().practical
-    largest = tried(found)[0] * ((1.0 + practical) if names else (1.0 - practical))
+    largest = held_out(fitter.fit(found)) * ((1.0 + practical) if names else (1.0 - practical))
     for more in (rest, *([effect] for effect in rest)):
         error, effects = tried([*found, *more])
-        if error <= largest:
-            return effects
+        if error > largest:
+            continue
+        lost = [one.id for one in effects if not one.universal
+                and (one.implausible() or not_determined(one, 'bench'))]
+        # What another effect has only stood in for goes out of its range once that is there.
+        return _with_universal(model, [one for one in found if one.id not in lost], fitted,
+                               excluded) if lost else effects
     return list(found)

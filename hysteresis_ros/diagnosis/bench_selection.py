@@ -19,11 +19,11 @@ import numpy as np
 from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
-from hysteresis_ros.diagnosis.extend import undetermined
+from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.forms import other_forms
 from hysteresis_ros.diagnosis.observable import observable, present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.effects import catalogue, Effect
-from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.workers import delayed, in_parallel
 
 if TYPE_CHECKING:
@@ -94,8 +94,11 @@ class BenchSelection:
 
     def run(self) -> None:
         """Fit every effect by itself, grow sets from the best, and compare what they predict."""
-        grown = self._grown()
-        self.tried = self._in_parallel(_judged, self.fitter, [fit.effects for fit in grown])
+        fits = self._begun_where_larger_ended(
+            self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
+        errors = {frozenset(fit.names): self.fitter.error(fit.predicted) for fit in fits}
+        self.tried = self._with_other_forms(self._in_parallel(_judged, self.fitter, [
+            fit for fit in fits if self._all_help(fit, errors)]))
         self.alone = sorted((fit for fit in self.tried if len(fit.effects) == 1), key=self.error)
         values = self._significance(self.tried, self.base)
         self.p_values = {fit.names: float(value) for fit, value in zip(self.tried, values)}
@@ -109,9 +112,50 @@ class BenchSelection:
                      if self.typical_error(fit) <= (1.0 + self.settings.practical) * best]
         self.found = min(near_best, key=lambda fit: (
             len(fit.effects), len(fit.vector), self.typical_error(fit)))
-        while self._leave_out_chance() or self._leave_out_unstable():
+        while (self._leave_out_chance() or self._leave_out_unstable()
+               or self._leave_out_undetermined()):
             pass
-        self._keep_determined()
+
+    def _begun_where_larger_ended(self, fits: Sequence[Fit]) -> list[Fit]:
+        """
+        Return fits, again from the values that a larger set has found if that had less error.
+
+        What the larger set adds may do nothing but lead out of a local minimum.
+        """
+        found = {frozenset(fit.names): fit for fit in fits}
+        errors = {names: self.fitter.error(fit.predicted) for names, fit in found.items()}
+        starts = []
+        for names in found:
+            larger = [other for other in found if names < other
+                      and errors[other] < (1.0 - WORTH_JUDGING) * errors[names]]
+            if larger:
+                ended = found[min(larger, key=lambda one: errors[one])]
+                starts.append([effect for effect in ended.effects if effect.id in names])
+        for fit in self._in_parallel(_fitted, self.fitter, starts):
+            names = frozenset(fit.names)
+            if self.fitter.error(fit.predicted) < errors[names]:
+                found[names] = fit
+        return list(found.values())
+
+    def _with_other_forms(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Return fits, the best of each size with another form where held-out rows ask for it."""
+        best: dict[int, Fit] = {}
+        for fit in sorted(fits, key=self.typical_error):
+            if other_forms(fit.effects):
+                best.setdefault(len(fit.effects), fit)
+        variants = [
+            [usual([effect], self.problem.kind)[0].with_values(**forms[effect.id])
+             if effect.id in forms else effect for effect in fit.effects]
+            for fit in best.values() for forms in other_forms(fit.effects)]
+        found = {fit.names: fit for fit in fits}
+        fitted = self._in_parallel(_fitted, self.fitter, variants)
+        for fit in self._in_parallel(_judged, self.fitter, fitted):
+            before = found[fit.names]
+            factor = np.inf if before.implausible() else 1.0 - self.settings.practical
+            if (self.typical_error(fit) < factor * self.typical_error(before)
+                    and not fit.implausible() and self._determines(fit)):
+                found[fit.names] = fit
+        return list(found.values())
 
     def _grown(self) -> list[Fit]:
         """
@@ -138,8 +182,9 @@ class BenchSelection:
             fitted = self._in_parallel(_fitted, self._search, [fit.effects for fit in chosen])
             generation = self._best(fitted, GROWN)
             errors.update((frozenset(fit.names), self._fitted_error(fit)) for fit in fitted)
-            found += [fit for fit in fitted if (fit in generation or _but_one_universal(fit))
-                      and self._all_help(fit, errors)]
+            # On the coarse grid a loop's width hides what an effect of the load does.
+            found += [fit for fit in fitted if _but_one_universal(fit)
+                      or fit in generation and self._all_help(fit, errors)]
         return found
 
     def _best(self, fits: Sequence[Fit], count: int) -> list[Fit]:
@@ -152,12 +197,13 @@ class BenchSelection:
         """
         Whether no effect can be left out of a set at no cost.
 
-        Without what takes the first stage's place, the rest would be no part of the set.
+        Of what every loaded muscle has only held-out loads can tell: the weights take up much of
+        it under the loads that they are fitted to.
         """
         largest = (1.0 - WORTH_JUDGING) * np.array([
             errors.get(frozenset(fit.names) - {effect.id}, np.inf) for effect in fit.effects
-            if not (isinstance(effect, MaterialEffect) and effect.load_per_drive_squared > 0.0)])
-        return bool(np.all(self._fitted_error(fit) <= largest))
+            if not effect.universal])
+        return bool(np.all(errors[frozenset(fit.names)] <= largest))
 
     def _fitted_error(self, fit: Fit) -> float:
         return self._search.error(fit.predicted)
@@ -207,13 +253,21 @@ class BenchSelection:
                         f'{100.0 * share[name]:.0f} % of them', without[name])
         return True
 
-    def _keep_determined(self) -> None:
-        """Leave out effects whose size the rows do not determine, but for what is usual."""
-        for effect in self.fitter.with_intervals(self.found):
-            size = f'{effect.id}.{effect.parameters[0].name} '
-            notes = [note for note in undetermined(effect, self.problem.kind) if size in note]
-            if notes and not effect.universal and effect.id in self.found.names:
-                self._leave_out(effect.id, notes[0], self._best_without(effect.id))
+    def _leave_out_undetermined(self) -> bool:
+        """Leave out the effect whose size the rows do not determine and that is missed least."""
+        notes = {effect.id: not_determined(effect, self.problem.kind)
+                 for effect in self.fitter.with_intervals(self.found)}
+        without = {name: self._best_without(name) for name, note in notes.items() if note}
+        if not without:
+            return False
+        name = min(without, key=lambda one: self.typical_error(without[one]))
+        self._leave_out(name, str(notes[name]), without[name])
+        return True
+
+    def _determines(self, fit: Fit) -> bool:
+        """Whether the rows determine the size of each effect of a fit."""
+        return not any(not_determined(effect, self.problem.kind)
+                       for effect in self.fitter.with_intervals(fit))
 
     def _leave_out(self, name: str, reason: str, instead: Fit) -> None:
         experiment = catalogue()[name].experiment
@@ -363,14 +417,24 @@ def _fitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
         return _finite(fitter.fit(effects))
 
 
-def _judged(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
-    """Fit some effects from their present values, and cross-validate the fit."""
+def _refitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
+    """Fit some effects from their present values, and those that have vanished from usual ones."""
+    kind = fitter.problem.kind
+    return _fitted(fitter, [usual([effect], kind)[0] if _vanished(effect) else effect
+                            for effect in effects])
+
+
+def _judged(fitter: BenchFitter, fit: Fit) -> Fit | None:
+    """Cross-validate a fit."""
     with np.errstate(all='ignore'):
-        fit = _fitted(fitter, effects)
-        if fit is None:
-            return None
         fit = fitter.cross_validate(fit)
         return fit if np.all(np.isfinite(fit.held_out)) else None
+
+
+def _vanished(effect: Effect) -> bool:
+    """Whether the size of an effect has come out neutral, from where no fit begins."""
+    size = effect.parameters[0]
+    return effect.values[size.name] == size.neutral
 
 
 def _finite(fit: Fit) -> Fit | None:

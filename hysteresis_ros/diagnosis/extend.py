@@ -7,18 +7,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 import dataclasses
 import hashlib
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.determined import not_determined, undetermined
+from hysteresis_ros.diagnosis.forms import with_best_forms
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.observable import may_differ, observable, present, unaffected
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
-from hysteresis_ros.diagnosis.simplest_forms import simplest_forms
 from hysteresis_ros.effects import Effect, effect_class
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements.quantities import shown
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 # Of the last fit, whose values are kept.
 EVALUATIONS, TOLERANCE = 30, 1e-4
-# An interval that covers this share of a physical range says nothing.
-SPANS = 0.9
 
 # Effects with intervals, and the names of parameters outside their physical range.
 Fitted = tuple[list[Effect], list[str]]
@@ -253,18 +251,22 @@ def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Mea
 def _fitted_together(fitter: BenchFitter, added: Sequence[Effect], known: Sequence[Effect]
                      ) -> list[Effect]:
     """Return the better fit of effects of a bench, with the simplest forms that do."""
-    added, kind = simplest_forms(fitter, added), fitter.problem.kind
+    added, kind = with_best_forms(fitter, added), fitter.problem.kind
     if not known:
         return added
     rivals = [fitter.fit(effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
               for effects in (known, added)]
-    added = fitter.with_intervals(min(rivals, key=lambda fit: (
-        len(fit.implausible()), fitter.error(fit.predicted))))
-    vague = {effect.id for effect in added if undetermined(effect, kind)}
+    best = min(rivals, key=lambda fit: (
+        len(fit.implausible()), fitter.error(fit.predicted)))
+    # A fit that runs out of the physical range explains something else.
+    if best.implausible() and not any(effect.implausible() for effect in known):
+        return with_best_forms(fitter, known, {effect.id for effect in known})
+    added = fitter.with_intervals(best)
+    vague = {effect.id for effect in added if not_determined(effect, kind)}
     located = {effect.id for effect in known
-               if effect.id in vague and not undetermined(effect, kind)}
+               if effect.id in vague and not not_determined(effect, kind)}
     # What only held-out rows have determined is not fitted again.
-    return simplest_forms(fitter, known if located else added, located)
+    return with_best_forms(fitter, known if located else added, located)
 
 
 def _unobservable(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],
@@ -280,21 +282,6 @@ def _unobservable(model: MuscleModel, names: Sequence[str], train: Sequence[Meas
         raise ParameterError(f'{"; ".join(notes)}. To see it: {experiments}. --force (in Python '
                              'force=True) fits it none the less')
     return notes
-
-
-def undetermined(effect: Effect, kind: str) -> list[str]:
-    """Return which parameters of a fitted effect have intervals that span their whole range."""
-    found = []
-    for parameter in effect.parameters:
-        if parameter.choices or parameter.form or kind not in parameter.kinds:
-            continue
-        low, high = effect.intervals.get(parameter.name, (math.nan, math.nan))
-        least, most = (-parameter.high if parameter.both_signs else parameter.low), parameter.high
-        covered = min(high, most) - max(low, least)
-        if covered >= SPANS * (most - least):
-            found.append(f'the interval of {effect.id}.{parameter.name} spans its physical range: '
-                         'these recordings do not determine it')
-    return found
 
 
 def _fitted(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement]

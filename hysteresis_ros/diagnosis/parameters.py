@@ -123,7 +123,8 @@ def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
     """
     fitted = [parameter for parameter in effect.parameters if kind in parameter.kinds]
     combinations = list(itertools.product(
-        *(parameter.choices or parameter.starts for parameter in fitted)))
+        *(parameter.starts if parameter.form else parameter.choices or parameter.starts
+          for parameter in fitted)))
     if len(combinations) > most:
         chosen = np.linspace(0, len(combinations) - 1, most).round().astype(int)
         combinations = [combinations[index] for index in chosen]

@@ -96,10 +96,13 @@ class StressDependentStrain(MaterialEffect):
 
     id = 'stress_dependent_strain'
     sentence = 'The transformation strain grows with the load and saturates.'
-    equation = ("S(F) = (1 - r exp(-F / F0)) / (1 - r exp(-Fm / F0)), Fm the bench's mean load; on "
-                'the arm alone: + growth (1 - exp(-F / F0)) above the line, from no load where r '
+    equation = ("S(F) = (1 - r s(F)) / (1 - r s(Fm)), s(F) = exp(-(F / F0)^n), Fm the bench's mean "
+                'load; on the arm alone: + growth (1 - s(F)) above the line, from no load where r '
                 'is known, else from Fm; the cold muscle at rest keeps its length')
-    source = 'orientation of martensite variants under stress'
+    source = ('orientation of martensite variants under stress: exponential (n = 1) as H_cur of '
+              'Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155, Gaussian (n = 2), or from '
+              'a critical stress on (larger n) as of Brinson, J. Intell. Mater. Syst. Struct. 4 '
+              '(1993) 229')
     shows_in = 'load, cold side'
     experiment = 'the same loop under three or more loads'
     confused_with = ('series_compliance',)
@@ -112,19 +115,20 @@ class StressDependentStrain(MaterialEffect):
         Parameter('F0', 'loads', "load scale of the saturation over the bench's mean load",
                   0.1, 5.0, 1.0, (0.5, 1.5), log=True, limits=(0.02, 4.99), kinds=('bench',)),
         Parameter('growth', '1', 'growth of the strain with the load against that on the bench',
-                  0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',)),)
+                  0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',)),
+        Parameter('n', '1', 'how late and abruptly it grows: 1 exponential, 2 Gaussian, 4 as from '
+                  'a critical load on', 1.0, 4.0, 1.0, (1.0,), choices=(1.0, 2.0, 4.0),
+                  kinds=('bench',), form=True))
 
     def scale(self, load: Values, surroundings: Surroundings) -> Values:
         """Grow with the load, one at the bench's mean load."""
         on_bench, growth = self._shares(load, surroundings)
         # A stroke of nothing could not be inverted.
-        return np.maximum(on_bench + growth, 0.02) / max(
-            1.0 - self.r * math.exp(-1.0 / self.F0), 0.02)
+        return np.maximum(on_bench + growth, 0.02) / self._at_mean()
 
     def strain_of_bench(self, load: Values, surroundings: Surroundings) -> Values:
         """Return the strain under a load over that under the bench's mean load."""
-        missing = np.exp(-np.maximum(load, 0.0) / (self.F0 * surroundings.load))
-        return (1.0 - self.r * missing) / max(1.0 - self.r * math.exp(-1.0 / self.F0), 0.02)
+        return (1.0 - self.r * self._missing(load, surroundings)) / self._at_mean()
 
     def stretch(self, load: Values, surroundings: Surroundings) -> Values:
         """Return what keeps the cold muscle's resting length, whatever the growth."""
@@ -133,10 +137,18 @@ class StressDependentStrain(MaterialEffect):
 
     def _shares(self, load: Values, surroundings: Surroundings) -> tuple[Values, Values]:
         """Return the share of the strain under a load on the bench, and what the arm adds to it."""
-        missing = np.exp(-np.maximum(load, 0.0) / (self.F0 * surroundings.load))
+        missing = self._missing(load, surroundings)
         # As for the shift of `stress_dependence`.
-        pivot = 1.0 if self.r else math.exp(-1.0 / self.F0)
+        pivot = 1.0 if self.r else self._missing(surroundings.load, surroundings)
         return 1.0 - self.r * missing, self.growth * (pivot - missing)
+
+    def _missing(self, load: Values, surroundings: Surroundings) -> Values:
+        """Return s, the part of what grows that is still missing under a load."""
+        return np.exp(-(np.maximum(load, 0.0) / (self.F0 * surroundings.load)) ** self.n)
+
+    def _at_mean(self) -> float:
+        """Return the strain under the mean load over that under an infinite one, at least 0.02."""
+        return max(1.0 - self.r * math.exp(-self.F0 ** -self.n), 0.02)
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:

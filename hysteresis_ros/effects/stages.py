@@ -104,6 +104,10 @@ class MaterialEffect(Effect):
         """Return S, the factor on the transformation strain under `load`."""
         return 1.0 + 0.0 * load
 
+    def elastic_share(self, surroundings: Surroundings) -> float:
+        """Return the share of the stroke under the mean load that grows in proportion to a load."""
+        return 0.0
+
     def strain_of_bench(self, load: Values, surroundings: Surroundings) -> Values:
         """Return the bench's transformation strain under a load over that under the mean load."""
         return 1.0 + 0.0 * load

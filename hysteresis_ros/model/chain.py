@@ -68,6 +68,7 @@ class Chain:
         # Those that make something of the load.
         self._shifting, self._playing = self._with('shift_load'), self._with('loop_width')
         self._scaling, self._stretching = self._with('scale'), self._with('stretch')
+        self._elastic = self._with('elastic_share')
         self.needs_phase = any(effect.needs_phase for effect in ordered)
         # A fan changes gain and time constant together (d1 stands in both).
         for effect in self.thermal:
@@ -249,6 +250,9 @@ class Chain:
         factor = 1.0 + 0.0 * load
         for effect in self._scaling:
             factor = factor * effect.scale(load, self.surroundings)
+        if self._elastic:
+            share = sum(effect.elastic_share(self.surroundings) for effect in self._elastic)
+            factor = (1.0 - share) * factor + share * load / self.surroundings.load
         return factor
 
     def stretch(self, load: Values) -> Values:

@@ -1,0 +1,44 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether recordings determine the parameters of an effect that was fitted to them."""
+
+from __future__ import annotations
+
+import math
+
+from hysteresis_ros.effects import Effect
+
+# An interval that covers this share of a physical range says nothing.
+SPANS = 0.9
+
+
+def undetermined(effect: Effect, kind: str) -> list[str]:
+    """Return which parameters of a fitted effect have intervals that span their whole range."""
+    found = []
+    for parameter in effect.parameters:
+        if parameter.choices or parameter.form or kind not in parameter.kinds:
+            continue
+        low, high = effect.intervals.get(parameter.name, (math.nan, math.nan))
+        least, most = (-parameter.high if parameter.both_signs else parameter.low), parameter.high
+        covered = min(high, most) - max(low, least)
+        if covered >= SPANS * (most - least):
+            found.append(f'the interval of {effect.id}.{parameter.name} spans its physical range: '
+                         'these recordings do not determine it')
+    return found
+
+
+def not_determined(effect: Effect, kind: str) -> str | None:
+    """
+    Return why recordings do not determine the size of a fitted effect, None if they do.
+
+    The size is the first parameter. It is not determined where its interval spans the whole
+    physical range, or where one too small to matter lies inside: then nothing shows the effect.
+    """
+    size = effect.parameters[0]
+    notes = [note for note in undetermined(effect, kind) if f'{effect.id}.{size.name} ' in note]
+    if notes:
+        return notes[0]
+    low, high = effect.intervals.get(size.name, (math.nan, math.nan))
+    if low <= size.low and high >= (-size.low if size.both_signs else size.low):
+        return f'the interval of {effect.id}.{size.name} contains a value too small to matter'
+    return None
