@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.cli.diagnose import to_text
 from hysteresis_ros.diagnosis import bench_selection, significance
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
@@ -18,7 +19,7 @@ from hysteresis_ros.diagnosis.parameters import ParameterVector
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
-from hysteresis_ros.laboratory.experiments import experiment_tables
+from hysteresis_ros.laboratory.experiments import bench_tables, experiment_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.measurements import Measurement
 
@@ -122,6 +123,57 @@ def test_a_lag_shows_without_an_arm():
     found = found_in(table(lagging))
     assert found.missing == ['valve_lag']
     assert found.effects[0].values == pytest.approx({'filling': 8.0, 'venting': 8.0}, rel=0.15)
+
+
+def test_the_noise_of_a_continuous_run_is_no_rounding():
+    """Where a column has all its digits, two rows differ by next to nothing somewhere."""
+    measurement = table(muscle)
+    columns = dict(measurement.columns)
+    columns['length'] = columns['length'] + np.random.default_rng(0).normal(
+        0.0, 2e-5, len(columns['length']))
+    found = found_in(Measurement.from_columns(columns), ['latency'])
+    # The motion adds a little.
+    assert 2e-5 < found.noise_floor < 3e-5
+
+
+@pytest.fixture(scope='module')
+def soft():
+    """Return the diagnosis of a pneumatic muscle that creeps, and its lengths."""
+    tables = bench_tables({'viscoelastic_creep': 1.0}, 3, 'mckibben')
+    force, length = (Measurement.from_columns(tables[name]) for name in
+                     ('force.csv', 'length.csv'))
+    model = identify(length, force).model
+    names = ('transformation_slopes', 'viscoelastic_creep')
+    return diagnose(model, [length], names, seed=0), length
+
+
+def test_the_error_of_a_bench_is_the_one_that_effects_are_chosen_by(soft):
+    """The RMSE of all rows, in which one load has most of the error, hardly changes."""
+    found, length = soft
+    assert set(found.missing) == {'transformation_slopes', 'viscoelastic_creep'}
+    share = 1.0 - found.rmse_after / found.rmse_before
+    assert share > 0.2 > 1.5 * (1.0 - found.pooled_after / found.pooled_before)
+    errors = {frozenset(row['effects']): row['rmse'] for row in found.sets}
+    assert errors[frozenset(found.missing)] == found.rmse_after
+    assert errors[frozenset()] == found.rmse_before
+    for row in found.ranking:
+        assert row['rmse_before'] == found.rmse_before
+        assert row['gain_low'] <= row['gain'] + 0.02 and row['gain'] <= row['gain_high'] + 0.02
+    assert found.small_error == pytest.approx(0.01 * np.ptp(length.columns['length']))
+
+
+def test_a_bench_says_which_error_is_which(soft):
+    """No error of the base model is known there, so that none is printed."""
+    found, _ = soft
+    assert found.structural_error is None
+    text = to_text(found, 'length')
+    share = 100.0 * (1.0 - found.rmse_after / found.rmse_before)
+    assert f'takes {share:.0f} % off the typical RMSE' in text
+    assert f'typical RMSE on rows not fitted: {1e3 * found.rmse_before:.3g} mm' in text
+    assert f'RMSE of all these rows: {1e3 * found.pooled_before:.3g} mm' in text
+    assert 'geometric mean' in text and f'below {1e3 * found.small_error:.2g} mm' in text
+    assert 'base model about' not in text
+    assert 'Diagnosis: missing' in repr(found) and 'typical RMSE on rows not' in repr(found)
 
 
 def test_a_gain_that_chance_could_give_is_no_answer(monkeypatch):

@@ -57,6 +57,12 @@ def test_every_load_counts_alike_whatever_its_error(selection):
         selection.problem.measured + errors[selection.problem.fold]))
     assert selection.typical_error(fit, 0.0) == pytest.approx(8e-3 ** 0.5 * 1e-3 ** 0.5)
     assert selection.typical_error(fit, 1.0) == pytest.approx(1.0, rel=1e-4)
+    # What is added to each fold is taken off again, and the order of sets stays.
+    assert 1e-3 < selection.typical_rmse(fit) < 8e-3
+    assert selection.typical_rmse(fit) == pytest.approx(np.sqrt(
+        selection.typical_error(fit) ** 2 - selection.small_error() ** 2))
+    same = dataclasses.replace(fit, held_out=selection.problem.measured + 2e-3)
+    assert selection.typical_rmse(same) == pytest.approx(2e-3)
     # By default a hundredth of the range: differences of less do not matter.
     assert selection.typical_error(selection.base) > 0.01 * np.ptp(
         selection.problem.measured)

@@ -63,17 +63,26 @@ def to_text(found: Diagnosis, response: str) -> str:
     """Return the diagnosis for a terminal."""
     from hysteresis_ros.comparison.compare import layout
     from hysteresis_ros.report.words import (
-        draws_in_words, parameters_in_words, verdict_in_words)
+        draws_in_words, error_in_words, noise_in_words, parameters_in_words, typical_in_words,
+        verdict_in_words)
 
     factor, unit = UNITS[response]
     lines = [verdict_in_words(found), '']
-    lines.append(f'error on rows not fitted: {factor * found.rmse_before:.3g} {unit}'
-                 + (f', with the effects {factor * found.rmse_after:.3g} {unit}'
-                    if found.missing else ''))
-    lines.append(f'noise floor {factor * found.noise_floor:.2g} {unit}, error of the base model '
-                 f'about {factor * found.structural_error:.2g} {unit}, unexplained '
-                 f'{100.0 * found.unexplained:.0f} %')
-    rows = [['effect', f'RMSE after [{unit}]', 'gain', 'p', 'absorbed', 'parameters']]
+    errors = [(f'{error_in_words(found)} on rows not fitted', found.rmse_before,
+               found.rmse_after),
+              ('RMSE of all these rows', found.pooled_before, found.pooled_after)]
+    lines += [f'{name}: {factor * before:.3g} {unit}'
+              + (f', with the effects {factor * after:.3g} {unit}' if found.missing else '')
+              for name, before, after in errors if before is not None and after is not None]
+    if typical_in_words(found):
+        lines.append(f'({typical_in_words(found)})')
+    lines.append(', '.join([
+        f'{noise_in_words(found)} {factor * found.noise_floor:.2g} {unit}',
+        *(f'{name} {factor * value:.2g} {unit}' for name, value in (
+            ('error of the base model about', found.structural_error),
+            ('no error matters below', found.small_error)) if value is not None),
+        f'unexplained {100.0 * found.unexplained:.0f} %']))
+    rows = [['effect', f'{found.error_name} after [{unit}]', 'gain', 'p', 'absorbed', 'parameters']]
     for row in found.ranking[:10]:
         values = parameters_in_words(row['parameters'], intervals=False)
         rows.append([row['effect'], f'{factor * row["rmse_after"]:.3g}',

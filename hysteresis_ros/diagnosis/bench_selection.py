@@ -304,12 +304,30 @@ class BenchSelection:
         that of this mean; else the least load, for which the others are extrapolated, would decide
         alone. Differences below `least` count as none; by default below what matters.
         """
+        floor = (self.small_error() if least is None else least) ** 2
+        return float(np.exp(0.5 * np.mean(np.log(self._squares(fit) + floor))))
+
+    def typical_rmse(self, fit: Fit) -> float:
+        """
+        Return the typical error as a reader expects it: without what was added to each fold.
+
+        It is less for one set than for another exactly where `typical_error` is.
+        """
+        return float(significance.typical_rmse(self._squares(fit), self.small_error()))
+
+    def gain_interval(self, fit: Fit, base: Fit) -> tuple[float, float]:
+        """Return the 95 % interval of the share by which a fit lowers a base's typical RMSE."""
+        before, after = (self.problem.measured - one.held_out for one in (base, fit))
+        return significance.typical_gain_interval(
+            before, after, self.problem.block, self.problem.fold, self.small_error(), self._rng)
+
+    def _squares(self, fit: Fit) -> np.ndarray:
+        """Return the held-out mean square error of each fold, shape (folds,)."""
         squares, rows = (np.bincount(self.problem.fold, weights=weights) for weights in (
             (self.problem.measured - fit.held_out) ** 2, np.ones(len(fit.held_out))))
-        floor = (self._small() if least is None else least) ** 2
-        return float(np.exp(0.5 * np.mean(np.log(squares[rows > 0] / rows[rows > 0] + floor))))
+        return squares[rows > 0] / rows[rows > 0]
 
-    def _small(self) -> float:
+    def small_error(self) -> float:
         """Return the error below which none matters."""
         return max(self.problem.noise, SMALL_ERROR * float(np.ptp(self.problem.measured)))
 
@@ -333,7 +351,7 @@ class BenchSelection:
             (self.problem.measured - one.predicted) ** 2, self.problem.block)
             for one in (base, fit))
         return (before - after) / (
-            before + after + self._small() ** 2 * np.bincount(self.problem.block))
+            before + after + self.small_error() ** 2 * np.bincount(self.problem.block))
 
     def _significance(self, fits: Sequence[Fit], base: Fit) -> np.ndarray:
         """Return family-wise p values of what fits explain beyond a base."""

@@ -9,9 +9,10 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from hysteresis_ros.diagnosis import significance, verdict
+from hysteresis_ros.diagnosis import verdict
 from hysteresis_ros.diagnosis.bench_selection import BenchSelection
 from hysteresis_ros.diagnosis.residual import shares, unexplained_signal
+from hysteresis_ros.measurements.metrics import sample_noise
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.bench_problem import BenchProblem
@@ -50,14 +51,13 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
     selection = BenchSelection(problem, settings, rng, jobs, progress)
     selection.run()
     fitter, base, found = selection.fitter, selection.base, selection.found
-    before, after = selection.error(base), selection.error(found)
     unexplained = _unexplained(selection)
     resembles = _resembles(selection)
     unknown = bool(resembles) or unexplained > UNEXPLAINED / max(len(found.effects), 1)
     residual = problem.measured - found.predicted
     if unknown:
         # What explains a part of it stands in the ranking; the cause is none of these.
-        selection.found, after = base, before
+        selection.found = base
     alternatives = selection.alternatives()
     effects = fitter.with_intervals(selection.found)
     missing = [effect.id for effect in effects]
@@ -67,14 +67,23 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
     hidden = {**selection.unstable, **selection.unobservable}
     return verdict.Diagnosis(
         verdict=kind, missing=missing, alternatives=named,
-        ranking=_ranking(selection, missing, rng), sets=_sets(selection, unknown),
-        noise_floor=problem.noise, structural_error=0.0,
+        ranking=_ranking(selection, missing), sets=_sets(selection, unknown),
+        # The weights are refitted: no error of the model is known beforehand.
+        noise_floor=_sensor_noise(problem), structural_error=None,
         unexplained=float(np.clip(unexplained, 0.0, 1.0)),
         experiment=verdict.next_experiment(
             kind, missing or resembles, named, hidden),
-        effects=effects, rmse_before=before, rmse_after=after,
+        effects=effects, rmse_before=selection.typical_rmse(base),
+        rmse_after=selection.typical_rmse(selection.found), pooled_before=selection.error(base),
+        pooled_after=selection.error(selection.found), small_error=selection.small_error(),
         not_excited=hidden, event=None,
         signal=unexplained_signal(problem, residual) if unknown else '', resembles=resembles)
+
+
+def _sensor_noise(problem: BenchProblem) -> float:
+    """Return what the sensor's resolution and, of a continuous run, its samples show of noise."""
+    return max([problem.noise, *(sample_noise(measurement) for measurement in problem.measurements
+                                 if not measurement.settled)])
 
 
 def _unexplained(selection: BenchSelection) -> float:
@@ -108,26 +117,24 @@ def _sets(selection: BenchSelection, unknown: bool) -> list[dict[str, Any]]:
     """Return the probabilities of sets; all of it is 'unknown' where the verdict is."""
     rows: list[dict[str, Any]] = [
         {'effects': list(fit.names), 'probability': 0.0 if unknown else float(share),
-         'rmse': selection.error(fit)}
+         'rmse': selection.typical_rmse(fit)}
         for fit, share in selection.probabilities() if share >= 1e-3]
     rest = max(1.0 - sum(row['probability'] for row in rows), 0.0)
     rows.append({'effects': ['unknown'], 'probability': float(rest),
-                 'rmse': selection.error(selection.base)})
+                 'rmse': selection.typical_rmse(selection.base)})
     return sorted(rows, key=lambda row: -row['probability'])
 
 
-def _ranking(selection: BenchSelection, missing: Sequence[str], rng: np.random.Generator
-             ) -> list[dict[str, Any]]:
+def _ranking(selection: BenchSelection, missing: Sequence[str]) -> list[dict[str, Any]]:
     problem, base = selection.problem, selection.base
     rows: list[dict[str, Any]] = []
     if not selection.alone:
         return rows
     for fit in selection.alone:
-        gain = significance.gain_interval(
-            problem.measured - base.held_out, problem.measured - fit.held_out, problem.block, rng)
         rows.append(verdict.ranking_row(
-            selection.fitter.with_intervals(fit)[0], fit, selection.error(base),
-            selection.error(fit), selection.p_values[fit.names], gain))
+            selection.fitter.with_intervals(fit)[0], fit, selection.typical_rmse(base),
+            selection.typical_rmse(fit), selection.p_values[fit.names],
+            selection.gain_interval(fit, base)))
     verdict.add_signatures(
         rows, np.stack([fit.predicted - base.predicted for fit in selection.alone]),
         problem.weight_columns(selection.fitter.fixed))

@@ -74,6 +74,65 @@ def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
     return float(low), float(high)
 
 
+def typical_rmse(squares: np.ndarray, small: float) -> np.ndarray:
+    """
+    Return the geometric mean of the RMSE of several folds, differences below `small` aside.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (..., folds)
+        Mean square error of each fold.
+    small : float
+        RMSE below which a fold's error does not matter.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Between the least and the largest RMSE of the folds.
+    """
+    mean = np.exp(np.mean(np.log(squares + small ** 2), axis=-1))
+    return np.sqrt(np.maximum(mean - small ** 2, 0.0))
+
+
+def typical_gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
+                          fold: np.ndarray, small: float, rng: np.random.Generator,
+                          level: float = 0.95, count: int = DRAWS) -> tuple[float, float]:
+    """
+    Interval of the relative reduction of the typical RMSE, by a bootstrap over a fold's blocks.
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (n,)
+        Residuals without and with the effect.
+    block, fold : ndarray of int, shape (n,)
+        Block and fold of every row.
+    small : float
+        See `typical_rmse`.
+    rng : numpy.random.Generator
+    level : float
+        Probability of the interval.
+    count : int
+        Number of draws of the blocks.
+
+    Returns
+    -------
+    low, high : float
+        1 - typical RMSE after / typical RMSE before.
+    """
+    means = []
+    for number in np.unique(fold):
+        rows = fold == number
+        _, own = np.unique(block[rows], return_inverse=True)
+        drawn = rng.integers(own.max() + 1, size=(count, own.max() + 1))
+        total = np.sum(np.bincount(own)[drawn], axis=1)
+        means.append([np.sum(block_sums(values[rows] ** 2, own)[drawn], axis=1) / total
+                      for values in (before, after)])
+    first, second = typical_rmse(np.moveaxis(np.array(means), 0, -1), small)
+    low, high = np.quantile(1.0 - second / np.maximum(first, 1e-300),
+                            [0.5 - level / 2.0, 0.5 + level / 2.0])
+    return float(low), float(high)
+
+
 def residualise(columns: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Return vectors (m, n) without what columns (n, k) explain of them."""
     if columns.shape[1] == 0:

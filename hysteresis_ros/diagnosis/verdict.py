@@ -45,9 +45,10 @@ class Diagnosis(Result):
         Sets of effects with their posterior probability and RMSE, most probable first; an empty
         set is the model as it is, ``['unknown']`` what no effect of the catalogue explains. They
         add up to 1.
-    noise_floor, structural_error : float
-        White noise of the sensor, and the expected error of the base model, in the unit of the
-        response.
+    noise_floor : float
+        White noise of the sensor, in the unit of the response.
+    structural_error : float or None
+        Expected error of the base model; None on a bench, where it is not known.
     unexplained : float
         Share of the mean square error that nothing explains.
     experiment : str
@@ -55,7 +56,9 @@ class Diagnosis(Result):
     effects : list of Effect
         The missing ones, fitted, with intervals.
     rmse_before, rmse_after : float
-        Held-out error without and with them.
+        Held-out error without and with them, by which effects are chosen, as in `ranking` and
+        `sets`: the RMSE of all rows, or on a bench the typical RMSE. That is the geometric mean of
+        the RMSE on each part that was held out, which is a load or a few trials.
     not_excited : dict of str to str
         Unobservable effects, with the reason.
     event : float or None
@@ -75,6 +78,11 @@ class Diagnosis(Result):
         was asked for.
     draws : int
         Random draws behind a p value; none can be smaller than 1 / (1 + draws). 0 if not known.
+    pooled_before, pooled_after : float or None
+        On a bench the RMSE of all rows held out, without and with the missing effects; sets are
+        not chosen by it. None on an arm.
+    small_error : float or None
+        On a bench the error below which none matters; None on an arm.
     """
 
     verdict: str
@@ -83,7 +91,7 @@ class Diagnosis(Result):
     ranking: list[dict[str, Any]]
     sets: list[dict[str, Any]]
     noise_floor: float
-    structural_error: float
+    structural_error: float | None
     unexplained: float
     experiment: str
     effects: list[Effect]
@@ -98,6 +106,14 @@ class Diagnosis(Result):
     quantity: str = ''
     where: list[dict[str, Any]] = dataclasses.field(default_factory=list)
     draws: int = 0
+    pooled_before: float | None = None
+    pooled_after: float | None = None
+    small_error: float | None = None
+
+    @property
+    def error_name(self) -> str:
+        """Name of the error by which effects are chosen."""
+        return 'RMSE' if self.pooled_before is None else 'typical RMSE'
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain types for JSON."""
@@ -118,7 +134,7 @@ class Diagnosis(Result):
                   if self.missing and set(entry['effects']) == set(self.missing)]
         if shares:
             first += f' (probability {shares[0]:.2f})'
-        error = f'RMSE on rows not fitted: {scale * self.rmse_before:.3g} {unit}'
+        error = f'{self.error_name} on rows not fitted: {scale * self.rmse_before:.3g} {unit}'
         if self.missing:
             error += f', with the effects {scale * self.rmse_after:.3g} {unit}'
         lines = [first, error, f'next: {self.experiment}']
@@ -129,8 +145,8 @@ class Diagnosis(Result):
         rows = [[row['effect'], f'{scale * row["rmse_after"]:.3g}', f'{100.0 * row["gain"]:.0f} %',
                  self.p_value(row), 'yes' if row['plausible'] else 'no']
                 for row in self.ranking[:SHOWN]]
-        return Brief(lines, ['effect', f'RMSE after [{unit or "1"}]', 'gain', 'p', 'plausible'],
-                     rows)
+        return Brief(lines, ['effect', f'{self.error_name} after [{unit or "1"}]', 'gain', 'p',
+                             'plausible'], rows)
 
     def p_value(self, row: dict) -> str:
         """Return the p value of a row of the ranking; `<=` before the least of these draws."""
@@ -163,10 +179,10 @@ def ranking_row(effect: Effect, fit: Fit, before: float, after: float, p_value: 
         Fitted, with intervals.
     fit : Fit
     before, after : float
-        RMSE on rows that were not fitted.
+        Error on rows that were not fitted, as in `Diagnosis`.
     p_value : float
     gain : (float, float)
-        Interval of the relative reduction of the RMSE.
+        Interval of the relative reduction of that error.
     """
     return {'effect': effect.id, 'rmse_before': before, 'rmse_after': after,
             'gain': 1.0 - after / before if before > 0.0 else 0.0,

@@ -16,7 +16,7 @@ from hysteresis_ros.report.glossary import linked
 from hysteresis_ros.report.page import Html
 from hysteresis_ros.report.provenance import Origin
 from hysteresis_ros.report.reasons import probabilities, share, why_not_another
-from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
+from hysteresis_ros.report.words import capital, parameters_in_words, verdict_in_words
 
 if TYPE_CHECKING:
     from hysteresis_ros.comparison.compare import Comparison
@@ -75,7 +75,7 @@ def diagnosis_card(found: Diagnosis, quantity: str, model_path: str, sources: Se
     facts = [(title, text) for title, text in (
         ('Value, with 95 % interval', values_of(found)),
         ('Probability', probability_of(found)),
-        ('RMSE on rows not fitted', errors_of(found, quantity))) if text]
+        (f'{capital(found.error_name)} on rows not fitted', errors_of(found, quantity))) if text]
     wide = [('Why not another', linked(why_not_another(found, quantity))),
             ('What to do next', Html(
                 f'{linked(found.experiment)}.' + page.command(
@@ -112,7 +112,7 @@ def probability_of(found: Diagnosis) -> Html:
 
 
 def errors_of(found: Diagnosis, quantity: str) -> Html:
-    """Return the held-out error before and after, with what noise leaves."""
+    """Return the held-out error before and after, with the error below which none matters."""
     unit, scale = shown(quantity)
     text = f'<strong>{number(scale * found.rmse_before)}'
     if found.missing:
@@ -122,7 +122,9 @@ def errors_of(found: Diagnosis, quantity: str) -> Html:
             text += f', {less:.0f} % less'
     else:
         text += f' {unit}</strong>'
-    return Html(text + f'; the noise floor is {number(scale * found.noise_floor)} {unit}')
+    if found.small_error is None:
+        return Html(text + f'; the noise floor is {number(scale * found.noise_floor)} {unit}')
+    return Html(text + f'; errors below {number(scale * found.small_error)} {unit} do not matter')
 
 
 def comparison_card(comparison: Comparison, model_path: str, origin: Origin) -> str:

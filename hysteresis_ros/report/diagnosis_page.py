@@ -22,7 +22,8 @@ from hysteresis_ros.report.plots import residual_against_signals
 from hysteresis_ros.report.provenance import Origin, provenance
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.comparison.where import number
-from hysteresis_ros.report.words import draws_in_words, parameters_in_words
+from hysteresis_ros.report.words import (
+    capital, draws_in_words, noise_in_words, parameters_in_words, typical_in_words)
 from hysteresis_ros.measurements.quantities import shown
 
 if TYPE_CHECKING:
@@ -77,14 +78,8 @@ def write_diagnosis(path: AnyPath, model: MuscleModel, measurements: Sequence[Me
         parts.append(page.section('What this recording could not show', page.listing(
             hidden, ordered=False)))
     if after is not None:
-        parts.append(page.section('Before and after', *errors(after)))
-    parts.append(page.section('What the error is made of', page.table(
-        ['part', f'RMSE [{unit}]'],
-        [['without the effects, rows not fitted', number(scale * found.rmse_before)],
-         *([['with them', number(scale * found.rmse_after)]] if found.missing else []),
-         ['error of the base model by itself (from the bench)',
-          number(scale * found.structural_error)],
-         ['noise floor of the sensor', number(scale * found.noise_floor)]])))
+        parts.append(page.section('Before and after, on all rows', *errors(after)))
+    parts.append(_parts_of_the_error(found, scale, unit))
     parts.append(provenance(origin, model_path, measurements))
     _write(path, 'What the model is missing', parts)
 
@@ -140,6 +135,24 @@ def _where(comparison: Comparison) -> str:
         descriptions(comparison)['signals'], 'signals'))
 
 
+def _parts_of_the_error(found: Diagnosis, scale: float, unit: str) -> str:
+    """Return what is known of the error as a section; of a bench by both its means."""
+    rows: list[tuple[str, float | None]] = [
+        (f'{found.error_name} without the effects, rows not fitted', found.rmse_before),
+        (f'{found.error_name} with them', found.rmse_after if found.missing else None),
+        ('RMSE of all these rows without the effects', found.pooled_before),
+        ('RMSE of all these rows with them', found.pooled_after if found.missing else None),
+        ('error of the base model by itself (from the bench)', found.structural_error),
+        ('error below which none matters: 1 % of the range, or the noise', found.small_error),
+        (noise_in_words(found), found.noise_floor)]
+    words = typical_in_words(found)
+    return page.section(
+        'What the error is made of',
+        page.table(['part', f'error [{unit}]'], [
+            [capital(name), number(scale * value)] for name, value in rows if value is not None]),
+        *([page.paragraph(f'{capital(words)}.')] if words else []))
+
+
 def _ranking(found: Diagnosis, scale: float, unit: str) -> str:
     """Return the effects by themselves as a section: bars, and all numbers in a table."""
     rows = found.ranking[:MOST_ROWS]
@@ -148,12 +161,15 @@ def _ranking(found: Diagnosis, scale: float, unit: str) -> str:
                      scale * row['rmse_before'] * (1.0 - row['gain_low']),
                      strong=row['effect'] in found.missing, hollow=not row['plausible'])
             for row in rows]
+    if len(found.missing) > 1:
+        bars.append(page.Bar(linked(' with '.join(found.missing)), scale * found.rmse_after,
+                             strong=True))
     bars.append(page.Bar('without any of them', scale * found.rmse_before, hollow=True))
     draws = draws_in_words(found)
     return page.section(
         'Effects, by what they do on rows not fitted',
-        page.paragraph('RMSE with each effect added alone, with its 95 % interval; in outline what '
-                       'is outside its physical range.'),
+        page.paragraph(f'{capital(found.error_name)} with each effect added alone, with its 95 % '
+                       'interval; in outline what is outside its physical range.'),
         page.bars(bars, unit), page.details('All numbers', _ranking_table(found, scale, unit)),
         *([page.paragraph(draws + '.')] if draws else []))
 
@@ -168,12 +184,12 @@ def _ranking_table(found: Diagnosis, scale: float, unit: str) -> str:
                      values])
     strong = [place for place, row in enumerate(found.ranking[:MOST_ROWS])
               if row['effect'] in found.missing]
-    return page.table(['effect', f'RMSE after [{unit}]', 'gain', 'p', 'refitted weights would '
-                       'absorb', 'plausible', 'parameters'], rows, strong)
+    return page.table(['effect', f'{found.error_name} after [{unit}]', 'gain', 'p',
+                       'refitted weights would absorb', 'plausible', 'parameters'], rows, strong)
 
 
 def _sets(found: Diagnosis, scale: float, unit: str) -> str:
     rows = [[linked(' with '.join(entry['effects']) or 'the model as it is'),
              f'{entry["probability"]:.3f}', number(scale * entry['rmse'])]
             for entry in found.sets[:MOST_ROWS]]
-    return page.table(['effects', 'probability', f'RMSE [{unit}]'], rows)
+    return page.table(['effects', 'probability', f'{found.error_name} [{unit}]'], rows)

@@ -305,7 +305,7 @@ def ranking(found: Diagnosis, most: int = 15) -> Figure:
                   mfc=colour if row['plausible'] else 'white')
     axis.axvline(scale * found.rmse_before, color='black', ls='--', lw=0.9)
     axis.set_yticks(range(len(rows)), [row['effect'] for row in rows])
-    axis.set_xlabel(f'RMSE on rows not fitted [{unit or "1"}]')
+    axis.set_xlabel(f'{found.error_name} on rows not fitted [{unit or "1"}]')
     axis.set_xlim(left=0.0)
     return figure
 

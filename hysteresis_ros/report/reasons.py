@@ -10,6 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from hysteresis_ros.comparison.where import number
 from hysteresis_ros.measurements.quantities import shown
+from hysteresis_ros.report.words import error_in_words
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.verdict import Diagnosis
@@ -87,12 +88,12 @@ def _of_sets(found: Diagnosis, rival: dict[str, Any], possible: list[frozenset[s
         return text + '.'
     errors = _errors(rival['rmse'], winner['rmse'], quantity)
     if any(names > answer for answer in possible):
-        return (f'{text}: its additional effect changes the RMSE to {errors}, less than one more '
-                'effect has to earn.')
+        return (f'{text}: its additional effect changes the {found.error_name} to {errors}, '
+                'less than one more effect has to earn.')
     if rival['rmse'] <= (1.0 + ALIKE) * winner['rmse']:
-        return (f'{text}: it fits as well (RMSE {errors}), but it needs more effects or less usual '
-                'values.')
-    return f'{text}: its RMSE is {errors}.'
+        return (f'{text}: it fits as well ({found.error_name} {errors}), but it needs more effects '
+                'or less usual values.')
+    return f'{text}: its {found.error_name} is {errors}.'
 
 
 def _alone(found: Diagnosis, row: dict[str, Any], quantity: str) -> str:
@@ -101,11 +102,12 @@ def _alone(found: Diagnosis, row: dict[str, Any], quantity: str) -> str:
     if found.verdict == 'missing':
         errors = _errors(row['rmse_after'], found.rmse_after, quantity)
         if not row['plausible']:
-            return (f'{name} leaves an RMSE of {errors}, but only with values outside its physical '
-                    'range.')
-        return f'{name} leaves an RMSE of {errors}.'
-    text = (f'{name} comes next: it takes {100.0 * row["gain"]:.0f} % off the error on rows not '
-            f'fitted (p {found.p_value(row)})')
+            return (f'with {name} the {found.error_name} is {errors}, but only with values outside '
+                    'its physical range.')
+        return f'with {name} the {found.error_name} is {errors}.'
+    text = (f'{name} comes next: it takes {100.0 * row["gain"]:.0f} % off the '
+            f'{error_in_words(found)} on rows not fitted '
+            f'(p {found.p_value(row)})')
     if not row['plausible']:
         return f'{text}, but only with values outside its physical range.'
     if found.verdict == 'unknown':

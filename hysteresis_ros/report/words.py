@@ -43,7 +43,7 @@ def verdict_in_words(found: Diagnosis) -> str:
         share = 100.0 * (1.0 - found.rmse_after / found.rmse_before)
         return ('Missing: ' + ' Also missing: '.join(parts)
                 + f' Adding {added_in_words(found)} takes {share:.0f} % off the '
-                'error.')
+                f'{error_in_words(found)}.')
     if found.verdict == 'unknown':
         if found.resembles:
             text = (f'Unknown: something acts here that is like {" with ".join(found.resembles)}, '
@@ -89,6 +89,30 @@ def added_in_words(found: Diagnosis) -> str:
     if any(found.alternatives):
         return ' and '.join(found.missing)
     return 'them' if len(found.missing) > 1 else 'it'
+
+
+def capital(text: str) -> str:
+    """Return text as it begins a sentence, abbreviations as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def error_in_words(found: Diagnosis) -> str:
+    """Name the error by which effects are chosen, 'error' where there is but one."""
+    return 'error' if found.pooled_before is None else found.error_name
+
+
+def noise_in_words(found: Diagnosis) -> str:
+    """Name the noise floor; of a bench table without time that is the sensor's rounding alone."""
+    return ('noise floor of the sensor' if found.small_error is None
+            else "the sensor's rounding, or its noise from sample to sample")
+
+
+def typical_in_words(found: Diagnosis) -> str:
+    """Say what the error is by which effects of a bench are chosen; '' on an arm."""
+    if found.pooled_before is None:
+        return ''
+    return ('the typical RMSE is the geometric mean of the RMSE on each load, or group of trials, '
+            'that was held out; effects are chosen by it, not by the RMSE of all these rows')
 
 
 def draws_in_words(found: Diagnosis) -> str:
