@@ -66,7 +66,7 @@ def table1(seeds: Iterable[int], effects: Sequence[str] | None = (), jobs: int =
     jobs : int
         Processes for the search of effects.
     muscle : str
-        What is on the bench: grains, brinson, lagoudas, tanaka, mckibben or scp.
+        What is on the bench, a key of `MUSCLES` or `SOFT_MUSCLES` of the laboratory.
 
     Returns
     -------

@@ -16,18 +16,20 @@ models, and writes the tables that a user would have. No file says what was hidd
 
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
+    from hysteresis_ros.laboratory.muscles import MUSCLES, SOFT_MUSCLES
+
+    soft = ' or '.join(SOFT_MUSCLES)
     parser = subparsers.add_parser(
         'simulate', help='measurements of the virtual laboratory', description=DESCRIPTION)
     parser.add_argument('protocol', metavar='PROTOCOL',
-                        help='bench, arm-steps, arm-dynamic; of mckibben or scp also bench-dynamic')
+                        help=f'bench, arm-steps, arm-dynamic; of {soft} also bench-dynamic')
     parser.add_argument('-o', '--output', type=OutputFolder, required=True, metavar='DIR')
     parser.add_argument('--effect', action='append', default=[], type=effect,
                         metavar='NAME[=STRENGTH]',
                         help='hide an effect; strength 1 is strong (default), 0.4 weak')
     parser.add_argument('--muscle', default='grains', metavar='MODEL',
-                        help='constitutive model of the wires: grains (default), brinson, '
-                        'lagoudas or tanaka; for the bench also mckibben (driven by pressure) or '
-                        'scp')
+                        help=f'constitutive model of the wires: {", ".join(MUSCLES)} (default: '
+                        f'grains); for the bench also {soft}, which are no wires')
     parser.add_argument('--seed', type=seed, default=0,
                         help='of specimen, noise and random sequences')
     return parser

@@ -13,6 +13,8 @@ HEADERS = {'two-stage': 'two-stage', 'linear': 'linear', 'with effects': '+ effe
 
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
+    from hysteresis_ros.laboratory.muscles import MUSCLES, SOFT_MUSCLES
+
     parser = subparsers.add_parser(
         'table1', help="the paper's experiment in the virtual laboratory",
         description='Identifies, verifies and compensates as in Sec. VII of the paper, on several '
@@ -25,8 +27,8 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         help='also the two-stage model with effects: those that the bench proves '
                         '(auto), or those named (default: none)')
     parser.add_argument('--muscle', default='grains', metavar='MODEL',
-                        help='grains (default), brinson, lagoudas, tanaka, or a muscle that is no '
-                        'wire, and has no arm: mckibben, scp')
+                        help=f'{", ".join(MUSCLES)} (default: grains), or a muscle that is no '
+                        f'wire, and has no arm: {", ".join(SOFT_MUSCLES)}')
     parser.add_argument('--jobs', type=count, default=1, metavar='N',
                         help='processes for the search of effects (default: 1)')
     add_json(parser)

@@ -32,11 +32,11 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from hysteresis_ros.laboratory.variation import vary
-from hysteresis_ros.laboratory.wire import Material, Wire
+from hysteresis_ros.laboratory.wire import TwoSlopeMaterial, Wire
 
 
 @dataclasses.dataclass(frozen=True)
-class BrinsonMaterial(Material):
+class BrinsonMaterial(TwoSlopeMaterial):
     """
     Constants of Brinson's model, by default those of the paper and an untrained wire.
 
@@ -114,11 +114,6 @@ class BrinsonMaterial(Material):
     def wire(self) -> 'BrinsonWire':
         """Return a new wire, cold."""
         return BrinsonWire(self)
-
-    def with_slopes(self, factor: float) -> 'BrinsonMaterial':
-        """Return the same with both Clausius-Clapeyron slopes times a factor."""
-        return dataclasses.replace(self, austenite_slope=self.austenite_slope * factor,
-                                   martensite_slope=self.martensite_slope * factor)
 
 
 class Shares(NamedTuple):

@@ -144,8 +144,8 @@ def experiment_tables(name: str, effects: Mapping[str, float] | None = None,
     seed : int
         Of specimen, noise and random sequences.
     muscle : str
-        Constitutive model of the wires: grains, brinson, lagoudas or tanaka; for the bench also a
-        muscle that is no wire: mckibben or scp.
+        Constitutive model of the wires, a key of `MUSCLES`; for the bench also a muscle that is no
+        wire, a key of `SOFT_MUSCLES`.
 
     Returns
     -------

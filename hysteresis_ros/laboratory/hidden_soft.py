@@ -15,6 +15,7 @@ import numpy as np
 
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.hidden_physics import SPREAD
+from hysteresis_ros.laboratory.muscles import MUSCLES
 from hysteresis_ros.laboratory.soft_muscle import SoftMaterial
 from hysteresis_ros.laboratory.tendon import Tendon
 
@@ -72,8 +73,7 @@ def with_effects(material: SoftMaterial, effects: Mapping[str, float], seed: int
             known = f'it can have {", ".join(possible)}; ' if possible else ''
             raise ParameterError(
                 f'laboratory: a {material.name} muscle cannot have {name}: {known}most effects '
-                'are those of shape memory wires; choose one of grains, brinson, lagoudas, '
-                'tanaka')
+                f'are those of shape memory wires; choose one of {", ".join(MUSCLES)}')
         if not (math.isfinite(strength) and 0.0 <= strength <= 2.0):
             raise ParameterError(f'laboratory: the strength of {name} has to be from 0 to 2, not '
                                  f'{strength!r}')

@@ -37,7 +37,7 @@ from typing import ClassVar
 import numpy as np
 
 from hysteresis_ros.laboratory.variation import vary
-from hysteresis_ros.laboratory.wire import Material, Wire
+from hysteresis_ros.laboratory.wire import TwoSlopeMaterial, Wire
 
 # Entries of the inverted hardening function.
 ENTRIES = 4000
@@ -46,7 +46,7 @@ SMALLEST_SHARE = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
-class LagoudasMaterial(Material):
+class LagoudasMaterial(TwoSlopeMaterial):
     """
     Constants of the unified model, by default those of the trained wire of the source.
 
@@ -130,11 +130,6 @@ class LagoudasMaterial(Material):
     def wire(self) -> 'LagoudasWire':
         """Return a new wire, cold."""
         return LagoudasWire(self)
-
-    def with_slopes(self, factor: float) -> 'LagoudasMaterial':
-        """Return the same with both Clausius-Clapeyron slopes times a factor."""
-        return dataclasses.replace(self, austenite_slope=self.austenite_slope * factor,
-                                   martensite_slope=self.martensite_slope * factor)
 
     def with_strain_growth(self, factor: float) -> 'LagoudasMaterial':
         """Return the same with H_sat - H_min times a factor."""

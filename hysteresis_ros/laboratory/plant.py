@@ -26,17 +26,12 @@ from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.bench import Bench, HOLD
-from hysteresis_ros.laboratory.brinson import BrinsonMaterial
 from hysteresis_ros.laboratory.conditions import Conditions
-from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.heat import HeatBalance
 from hysteresis_ros.laboratory.hidden_physics import apply_effects
 from hysteresis_ros.laboratory.hidden_soft import with_effects
-from hysteresis_ros.laboratory.lagoudas import LagoudasMaterial
-from hysteresis_ros.laboratory.mckibben import McKibbenMaterial
-from hysteresis_ros.laboratory.scp import ScpMaterial
+from hysteresis_ros.laboratory.muscles import MUSCLES, SOFT_MUSCLES
 from hysteresis_ros.laboratory.soft_bench import SoftBench
-from hysteresis_ros.laboratory.tanaka import TanakaMaterial
 from hysteresis_ros.laboratory.wire import Material
 from hysteresis_ros.spelling import unknown
 
@@ -45,11 +40,6 @@ if TYPE_CHECKING:
 
 # Time constants of Eq. 1 [s]: in the paper, and in continuous recordings.
 PAPER, BRISK = 5.0, 0.02
-# Constitutive models of the wire.
-MUSCLES = {kind.name: kind for kind in (
-    GrainMaterial, BrinsonMaterial, LagoudasMaterial, TanakaMaterial)}
-# Muscles that are no wires; they are on the bench only.
-SOFT_MUSCLES = {kind.name: kind for kind in (McKibbenMaterial, ScpMaterial)}
 
 
 def specimen(seed: int, muscle: str = 'grains') -> Material:

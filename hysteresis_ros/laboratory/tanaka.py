@@ -36,14 +36,14 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from hysteresis_ros.laboratory.variation import vary
-from hysteresis_ros.laboratory.wire import Material, Wire
+from hysteresis_ros.laboratory.wire import TwoSlopeMaterial, Wire
 
 # By which the exponent changes between start and finish, so that one percent is left.
 RATE = math.log(100.0)
 
 
 @dataclasses.dataclass(frozen=True)
-class TanakaMaterial(Material):
+class TanakaMaterial(TwoSlopeMaterial):
     """
     Constants of Tanaka's model, by default those of an untrained Ni-Ti wire.
 
@@ -110,11 +110,6 @@ class TanakaMaterial(Material):
     def wire(self) -> 'TanakaWire':
         """Return a new wire, cold."""
         return TanakaWire(self)
-
-    def with_slopes(self, factor: float) -> 'TanakaMaterial':
-        """Return the same with both Clausius-Clapeyron slopes times a factor."""
-        return dataclasses.replace(self, austenite_slope=self.austenite_slope * factor,
-                                   martensite_slope=self.martensite_slope * factor)
 
 
 class Branch(NamedTuple):

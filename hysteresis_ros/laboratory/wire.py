@@ -9,8 +9,9 @@ the state; elongation is counted from the resting length, that of the cold wire 
 """
 
 import abc
+import dataclasses
 import math
-from typing import ClassVar
+from typing import Any, cast, ClassVar
 
 import numpy as np
 
@@ -95,6 +96,26 @@ class Material(abc.ABC):
         return ParameterError(f'laboratory: a {self.name} muscle cannot have {effect}: its '
                               'constitutive equations have no such constant; choose another '
                               'muscle or effect')
+
+
+class TwoSlopeMaterial(Material):
+    """
+    Constants of a wire whose transformation temperatures rise in proportion to the stress.
+
+    Attributes
+    ----------
+    austenite_slope, martensite_slope : float
+        Clausius-Clapeyron slopes [Pa/K], fields of the dataclass that a model is.
+    """
+
+    austenite_slope: float
+    martensite_slope: float
+
+    def with_slopes(self, factor: float) -> 'Material':
+        """Return the same with both Clausius-Clapeyron slopes times a factor."""
+        return dataclasses.replace(
+            cast(Any, self), austenite_slope=self.austenite_slope * factor,
+            martensite_slope=self.martensite_slope * factor)
 
 
 class Wire(abc.ABC):
