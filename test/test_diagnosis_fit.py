@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits of effects to measured rows: their parameters, their starts, and what is held out."""
 
+import dataclasses
+
 from hypothesis import given, strategies as st
 from model_support import bicep_model, effect_of, runs, STRENGTHS
 import numpy as np
@@ -321,6 +323,20 @@ def test_the_evidence_under_the_covariance_of_the_residuals_is_the_larger_one(lo
     finally:
         loaded.covariance.points[:] = points
     assert refined.log_evidence > fit.log_evidence
+
+
+def test_a_fit_knows_how_long_its_recording_takes(loaded):
+    """What adds up over that is implausible where the sum is."""
+    fit, = loaded.fit([[neutral(loaded, 'ambient_drift')]], loaded.covariance.points[0])
+    run = loaded.problem.measurements[0]
+    # Its trials follow each other.
+    duration = sum(float(run.column('time')[rows][-1]) for _, rows in run.split())
+    assert fit.duration == pytest.approx(duration) and fit.implausible() == []
+    rate = 1.2 * 8.0 / duration * 600.0
+    drift = fit.effects[0].with_values(offset=0.0, rate=rate, curvature=0.0)
+    assert 'ambient_drift.total' in dataclasses.replace(fit, effects=[drift]).implausible()
+    slower = drift.with_values(rate=rate / 1.2)
+    assert 'ambient_drift.total' not in dataclasses.replace(fit, effects=[slower]).implausible()
 
 
 def test_a_fold_is_predicted_by_a_step_no_longer_than_it_helps(loaded):

@@ -177,6 +177,23 @@ def test_implausible_values_are_named_but_neutral_ones_are_not():
     assert effect_of(model, 'end_stop', stop=1.0, side=0.5, stiffness=1.0).implausible() == ['side']
 
 
+@pytest.mark.parametrize('values, duration, named', [
+    ({'offset': 6.0, 'rate': 9.0, 'curvature': 6.0}, 600.0, ['total']),
+    # An end of the recording within the range, and so the start, but not the change between them.
+    ({'offset': -6.0, 'rate': 12.0}, 600.0, ['total']),
+    ({'rate': 12.0, 'curvature': -8.0}, 600.0, []),
+    ({'rate': 4.0}, 600.0, []), ({'rate': 4.0}, 3600.0, ['total']),
+    ({'offset': 9.0}, 0.0, ['offset', 'total'])])
+def test_a_drift_of_plausible_terms_that_add_up_to_too_much_is_implausible(
+        values, duration, named):
+    """8 V^2 are 20 K; how much a rate adds depends on how long the recording takes."""
+    drift = effect_of(bicep_model(), 'ambient_drift', **values)
+    if 'offset' not in named:
+        assert Effect.implausible(drift) == []
+    assert drift.implausible(duration=duration) == named
+    assert drift.implausible(slack=2.0, duration=duration) == []
+
+
 def test_values_are_read_as_attributes_and_changed_in_a_copy():
     model = bicep_model()
     effect = effect_of(model, 'clamp_mass')

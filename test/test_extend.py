@@ -11,7 +11,7 @@ import pytest
 
 from hysteresis_ros.cli.main import main
 from hysteresis_ros.diagnosis.determined import undetermined
-from hysteresis_ros.diagnosis.extend import extend, rmse
+from hysteresis_ros.diagnosis.extend import extend, extend_by_hand, rmse
 from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.measurements import Measurement, write_csv
 from hysteresis_ros.model import MuscleModel
@@ -272,6 +272,16 @@ def test_values_given_by_hand_are_taken_as_they_are(files, base, recordings):
     assert model.provenance['extended'][-1]['by_hand'] is True
     assert found['train']['rmse_after'] == pytest.approx(rmse(model, recordings))
     assert found['train']['rmse_after'] < 0.2 * found['train']['rmse_before']
+
+
+def test_a_drift_given_by_hand_is_implausible_if_it_adds_up_to_too_much(base, recordings):
+    """The range of each of its terms does not know how long the recording takes."""
+    duration = max(float(one.columns['time'][-1]) for one in recordings)
+    for share, named in ((0.9, []), (1.1, ['ambient_drift.total'])):
+        drift = effect_of(base, 'ambient_drift', offset=0.0, curvature=0.0,
+                          rate=share * 8.0 * 600.0 / duration)
+        found = extend_by_hand(base, [drift], recordings)
+        assert [one for one in found.implausible if one.endswith('total')] == named
 
 
 def test_trials_that_are_not_named_are_not_fitted(files, base, recordings):

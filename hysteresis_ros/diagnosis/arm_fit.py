@@ -73,6 +73,8 @@ class Fit:
         effects; None for the base model's along the way that it takes without.
     judged : int
         How many covariances at hand were tried with `covariance`.
+    duration : float
+        Of the recording that was fitted [s].
     """
 
     effects: list[Effect]
@@ -85,6 +87,7 @@ class Fit:
     held_out: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     covariance: Covariance | None = None
     judged: int = 0
+    duration: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -110,9 +113,9 @@ class Fit:
         return noise_of(self.require_values())
 
     def implausible(self) -> list[str]:
-        """Names of parameters whose estimate is outside their physical range."""
+        """Names of parameters, or sums, whose estimate is outside their physical range."""
         return [f'{effect.id}.{name}' for effect in self.effects
-                for name in effect.implausible(ESTIMATE_SLACK)]
+                for name in effect.implausible(ESTIMATE_SLACK, self.duration)]
 
 
 class _Walk:
@@ -260,7 +263,7 @@ class Fitter:
                     walk.jacobian = None
         self._differentiate([walk for walk in walks if walk.jacobian is None])
         return [self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
-                               walk.predicted, walk.jacobian))
+                               walk.predicted, walk.jacobian, duration=self.problem.duration))
                 for walk in walks if np.all(np.isfinite(walk.jacobian))]
 
     def _at(self, walks: Sequence[_Walk], vectors: Sequence[Sequence[np.ndarray]]

@@ -79,7 +79,8 @@ class Response:
         effects = self.parameters.with_vector(vector)
         free = ParameterVector(effects, self.problem.kind).entries
         kept = [entry in free for entry in self.parameters.entries]
-        return Fit(effects, vector[kept], self.predicted(vector), self.jacobian(vector)[:, kept])
+        return Fit(effects, vector[kept], self.predicted(vector), self.jacobian(vector)[:, kept],
+                   duration=self.problem.duration)
 
     def predicted(self, vector: np.ndarray) -> np.ndarray:
         """Return the response of all rows, shape (n,)."""

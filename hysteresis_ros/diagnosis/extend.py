@@ -201,7 +201,8 @@ def extend_by_hand(model: MuscleModel, effects: Sequence[Effect], train: Sequenc
     problem_for(model, [*train, *test])
     problem, classes = _without(model, [effect.id for effect in effects], train)
     stages = [(f'+ {kind.id}', list(effects[:number])) for number, kind in enumerate(classes, 1)]
-    implausible = [f'{effect.id}.{name}' for effect in effects for name in effect.implausible()]
+    implausible = [f'{effect.id}.{name}' for effect in effects
+                   for name in effect.implausible(duration=problem.duration)]
     return _gained(model, problem, stages, train, test, implausible, [], by_hand=True)
 
 

@@ -135,6 +135,11 @@ class Problem:
         """Identifiers of the folds."""
         return np.unique(self.fold)
 
+    @property
+    def duration(self) -> float:
+        """Time from the beginning of a recording to its last row [s], of the longest one."""
+        return float(np.max(self.own_clock))
+
     def _signals(self) -> dict[str, np.ndarray]:
         columns: dict[str, list[np.ndarray]] = {}
         for simulator in self.simulators:

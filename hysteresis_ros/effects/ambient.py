@@ -61,8 +61,21 @@ class AmbientDrift(ThermalEffect):
                   both_signs=True),)
 
     CLOCK_UNIT = 600.0
+    # What all terms are together, at any time, and their change over a recording [V^2]: 20 K.
+    LARGEST_TOTAL = 8.0
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Add a slow function of the time since the recording began."""
-        t = inputs.clock / self.CLOCK_UNIT
-        return signal + self.offset + self.rate * t + self.curvature * t * t
+        return signal + self.total(inputs.clock)
+
+    def total(self, clock: Values) -> Values:
+        """Return what the air adds [V^2] at times since the recording began [s]."""
+        t = clock / self.CLOCK_UNIT
+        return self.offset + self.rate * t + self.curvature * t * t
+
+    def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
+        """Name also the total, where no room is as warm or changes as much in a recording."""
+        total = self.total(np.linspace(0.0, duration, 101))
+        size = max(float(np.max(np.abs(total))), float(np.ptp(total)))
+        return super().implausible(slack, duration) + (
+            ['total'] if size > self.LARGEST_TOTAL * (1.0 + slack) else [])

@@ -261,8 +261,18 @@ class Effect(abc.ABC):
         copy.parameters = self.parameters
         return copy
 
-    def implausible(self, slack: float = 0.0) -> list[str]:
-        """Name the parameters outside their physical range (see `Parameter`), if in use."""
+    def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
+        """
+        Name the parameters outside their physical range, if in use.
+
+        Parameters
+        ----------
+        slack : float
+            See `Parameter.plausible`.
+        duration : float
+            Of the recording [s]; an effect whose terms add up over it names what is too large
+            together as well.
+        """
         return [parameter.name for parameter in self.parameters
                 if self.values[parameter.name] != parameter.neutral
                 and not parameter.plausible(self.values[parameter.name], slack)]
