@@ -154,7 +154,7 @@ def test_neutral_cables_change_nothing():
 
 @pytest.mark.parametrize('name, other', [('cable_friction', 'coulomb_friction'),
                                          ('coulomb_friction', 'cable_friction')])
-def test_one_friction_is_named_and_the_other_at_most_beside_it(name, other):
+def test_one_friction_is_named_and_the_other_at_most_together_with_it(name, other):
     values = {'cable_friction': {'mu_phi': 0.15}, 'coulomb_friction': {'tau_c': 0.05}}[name]
     arm = MODEL.with_effects([effect_of(MODEL, name, **values)])
     found = diagnose(MODEL, [runs(arm, trials=4, rows=30, seed=4)],

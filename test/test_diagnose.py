@@ -171,8 +171,8 @@ def test_something_that_happened_once_is_told_by_its_time(model):
     assert 0.3 * 7200.0 - 60.0 <= found.event <= 0.6 * 7200.0 + 60.0
 
 
-@pytest.mark.xfail(reason='one effect leaves less than the base model errs by: none is looked for')
-def test_two_effects_behind_one_that_stands_in_for_both_are_found_as_a_pair(model):
+@pytest.mark.xfail(reason='the residual of one effect is less than the error of the base model')
+def test_two_effects_that_one_could_explain_are_found_as_a_pair(model):
     """A dead zone and a sag look like a load that counts more."""
     train, _ = recordings({'supply_sag': 1.0, 'pwm_dead_zone': 1.0}, trials=(0, 1, 2, 3))
     found = diagnose(model, [train], ['stress_dependence', 'supply_sag', 'pwm_dead_zone'],

@@ -205,7 +205,7 @@ def test_what_martensite_may_keep_of_its_load_is_part_of_the_discrepancy():
 
 @pytest.mark.parametrize('fitted', [True, False])
 def test_what_may_be_kept_is_no_discrepancy_where_it_is_an_effect(fitted):
-    """In a set, or tried beside it, its own parameter says how much is kept."""
+    """In a set, or tried together with it, its own parameter says how much is kept."""
     model = bicep_model()
     effects = [effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)]
     if fitted:

@@ -170,7 +170,7 @@ def test_an_interval_that_spans_the_range_is_said_to_say_nothing(base):
 
 
 def test_an_effect_that_the_bench_has_shown_is_fitted_anew_to_the_arm(base, recordings):
-    """The wires of the arm are others; a second compliance beside the first would be no effect."""
+    """The wires of the arm are others; a compliance next to the first would be no effect."""
     model = base.with_effects([effect_of(base, 'series_compliance')])
     extended = extend(model, ['series_compliance'], recordings[:1]).model
     assert [effect.id for effect in extended.effects] == ['series_compliance']
@@ -197,7 +197,7 @@ def test_recordings_of_two_kinds_are_refused(base, recordings):
 
 
 def test_a_test_recording_of_another_kind_is_refused(base, recordings, tmp_path, capsys):
-    """An error in metres beside one in radians would say nothing."""
+    """An error in metres next to one in radians would say nothing."""
     bench = Measurement.from_columns({
         'trial': np.zeros(3), 'step': np.arange(3.0), 'voltage': np.arange(3.0),
         'force': np.ones(3), 'length': np.zeros(3)})

@@ -135,7 +135,7 @@ def test_an_effect_that_contains_another_one_counts_as_both(model):
 
 
 def test_a_larger_set_is_no_answer_where_a_smaller_one_suffices(payload):
-    """Each of its effects would have to matter, and beside the planted one nothing does."""
+    """Each of its effects would have to matter, and next to the planted one nothing does."""
     payload.grow(frozenset(['payload_error']))
     larger = [names for names in payload.sets.fits if len(names) > 1 and 'payload_error' in names]
     assert larger

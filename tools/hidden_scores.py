@@ -14,7 +14,7 @@ SINGLE = 'strong', 'weak'
 MARKS = '<!-- hidden effects: begin -->', '<!-- hidden effects: end -->'
 # Bins of the probabilities in the reliability table: name, and where each begins [%].
 BINS = {'<50': 0.0, '50-70': 50.0, '70-90': 70.0, '>=90': 90.0}
-# A set that leaves no more than this times what the truth leaves predicts as well.
+# A set with a residual of at most this times that of the truth predicts as well.
 AS_WELL = 1.05
 # Earlier outputs do not name the muscle.
 FIRST_MUSCLE = 'grains'

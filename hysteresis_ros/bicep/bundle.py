@@ -33,7 +33,7 @@ class Bundle:
     Attributes
     ----------
     muscles : ndarray, shape (muscles, 4)
-        What is remembered of each beside its operator's memory; see `kernels.formation`.
+        What is remembered of each in addition to its operator's memory; see `kernels.formation`.
     """
 
     def __init__(self, operator: HysteresisOperator, chain: Chain, loaded: bool) -> None:

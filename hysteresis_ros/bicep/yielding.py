@@ -93,10 +93,10 @@ class YieldingBalance:
         return self._yield(lambda more: self._arm.step(x, dt, offset + more, factor, clock), clock)
 
     def _yield(self, advance: Callable[[float], float], clock: float) -> float:
-        """Return the angle of `advance(residual)`, with the residual that its load leaves."""
+        """Return the angle of `advance(residual)`, with the residual elongation under its load."""
         state = self._arm.snapshot()
         angle = advance(self._residual)
-        low, above = self._residual, self._left_by(angle, clock) - self._residual
+        low, above = self._residual, self._residual_under(angle, clock) - self._residual
         high, below = math.inf, 0.0
         # The longer the muscles, the less they yield.
         for trial in range(MOST_TRIALS if above > TOLERANCE else 0):
@@ -108,7 +108,7 @@ class YieldingBalance:
                 self._residual = 0.5 * (low + high)
             self._arm.rewind(state)
             angle = advance(self._residual)
-            error = self._left_by(angle, clock) - self._residual
+            error = self._residual_under(angle, clock) - self._residual
             if abs(error) <= TOLERANCE:
                 break
             if error > 0.0:
@@ -117,8 +117,8 @@ class YieldingBalance:
                 high, below = self._residual, error
         return angle
 
-    def _left_by(self, angle: Any, clock: Any) -> Any:
-        """Return the residual elongation [m] that the load at each angle [rad] leaves."""
+    def _residual_under(self, angle: Any, clock: Any) -> Any:
+        """Return the residual elongation [m] under the load at each angle [rad]."""
         return self._compliance * np.maximum(self._arm.load(angle, clock) - self._load, 0.0)
 
     def run(self, cold: float, ends: np.ndarray, x: np.ndarray, dt: np.ndarray, offset: np.ndarray,
@@ -154,7 +154,7 @@ class YieldingBalance:
         """Fill `found` (3, rows) as far as nothing yields, go there, and return how far."""
         state, (x, dt, offset, *others) = self._arm.snapshot(), columns
         found[:] = self._arm.proceed(x, dt, offset + self._residual, *others)
-        above = self._left_by(found[0], others[-1]) - self._residual > TOLERANCE
+        above = self._residual_under(found[0], others[-1]) - self._residual > TOLERANCE
         if not above.any():
             return len(x)
         held = int(np.argmax(above))

@@ -52,7 +52,7 @@ class Comparison(Result):
     where : list of Region
         Worst first.
     floor : Floor
-        What the noise of the recording leaves to any model.
+        RMSE of the noise of the recording alone; no model has less.
     warnings : list of str
         What looked wrong in the recordings.
     measured, predicted, linear_predicted : ndarray of float64 (rows,)

@@ -3,9 +3,10 @@
 """
 The verdict on runs of an arm, from the posterior probabilities of the sets of effects.
 
-A set that leaves more than the base model's own error could be does not explain the recording:
-something unknown acts as well, whose probability beforehand is that of any effect, and the set's
-probability is that of an unknown cause. So is the probability of something that happened once.
+A set with a larger residual than the base model's own error could be does not explain the
+recording: something unknown acts as well, whose probability beforehand is that of any effect, and
+the set's probability is that of an unknown cause. So is the probability of something that happened
+once.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ LEAST_DRIVE = 0.05
 LEAST_CHANGE = 0.3
 # More than this share of the effects not excited: nothing is.
 MOST_UNOBSERVABLE = 0.8
-# An implausible set that leaves less than this share of the best one's residual resembles it.
+# An implausible set whose residual is less than this share of the best one's resembles it.
 RESEMBLES = 0.6
 MOST_ALTERNATIVES = 3
 

@@ -47,7 +47,7 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     length, force : Measurement
         The bench tables; `force` only for the metrics.
     names : sequence of str, optional
-        Effects to add; by default those that the length table proves, and beside them those that
+        Effects to add; by default those that the length table proves, and with them those that
         every loaded muscle has.
     length_trials, force_trials : sequence of numbers, optional
         Trials that are fitted; the others verify.
@@ -153,7 +153,7 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
             continue
         lost = [one.id for one in effects if not one.universal
                 and (one.implausible() or not_determined(one, 'bench'))]
-        # What another effect has only stood in for goes out of its range once that is there.
+        # What only explained the residual of another effect leaves its range once that is there.
         return _with_universal(model, [one for one in found if one.id not in lost], fitted,
                                excluded) if lost else effects
     return list(found)

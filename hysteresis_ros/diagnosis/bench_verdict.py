@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.settings import Settings
     from hysteresis_ros.workers import Progress
 
-# More than this share of the first mean square left over means that the cause is not known.
+# A residual of more than this share of the first mean square: the cause is not known.
 UNEXPLAINED = 0.3
 # A structured error below this share of the response's range is that of any model.
 LEAST_STRUCTURE = 0.02
 # A held-out error above this share of the range: the model predicts nothing.
 LARGEST_ERROR = 0.15
-# An implausible set that leaves less than this share of the best one's residual resembles it.
+# An implausible set whose residual is less than this share of the best one's resembles it.
 RESEMBLES = 0.6
 
 

@@ -170,7 +170,7 @@ class FittedSets:
         return self.noise_free_rmse(names) <= self._allowed(names)
 
     def _allowed(self, names: frozenset[str]) -> float:
-        """Return the root mean square that a set may leave, in the unit of the response."""
+        """Return the largest RMSE that a set may have, in the unit of the response."""
         covariance = self.fits[names].covariance
         if covariance is None:
             return self.rmse_95
@@ -232,8 +232,8 @@ class FittedSets:
         """
         Whether a smaller set may be the answer, and is not clearly less probable.
 
-        Where it leaves more than the base model's own error could be, and the larger set does not,
-        it must not be less probable at all.
+        Where its residual is larger than the base model's own error could be, and that of the
+        larger set is not, it must not be less probable at all.
         """
         if not self.sufficient(without) or self.fits[without].implausible():
             return False

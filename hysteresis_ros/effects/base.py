@@ -96,7 +96,7 @@ class Parameter:
 
 class Inputs(NamedTuple):
     """
-    What was recorded beside the drive, as arrays of one trial or as scalars of one moment.
+    What was recorded with the drive, as arrays of one trial or as scalars of one moment.
 
     `time` [s] runs from the start of the trial, `clock` [s] from the start of the recording, `dt`
     is the time since the row before [s]; `ambient` [degC] is NaN where not recorded; `phase` is the

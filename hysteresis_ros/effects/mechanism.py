@@ -123,7 +123,7 @@ class PayloadError(MechanismEffect):
 
 
 class ClampMass(MechanismEffect):
-    """The clamp has a weight of its own, beside the forearm."""
+    """The clamp has a weight of its own, in addition to the forearm."""
 
     id = 'clamp_mass'
     sentence = "The clamp's own weight turns the arm, with another phase than the payload."

@@ -35,7 +35,7 @@ def fit_linear(length: Measurement | None = None, force: Measurement | None = No
     """
     Fit Eq. 11 as the paper does: a line through the forces, then one through the lengths.
 
-    The second goes through the origin, because Eq. 11 has no constant beside F0. Without a force
+    The second goes through the origin, because Eq. 11 has no constant but F0. Without a force
     table all three constants come from the lengths at once, and without a load F is zero.
 
     Parameters

@@ -3,7 +3,7 @@
 """
 Nonlinear least squares within bounds, for few parameters and residuals that are dear.
 
-Gauss-Newton steps with Levenberg's damping, each the best within the bounds. Beside
+Gauss-Newton steps with Levenberg's damping, each the best within the bounds. Unlike
 `scipy.optimize.least_squares` this takes no derivative that no step uses, and costs nothing to
 import.
 """

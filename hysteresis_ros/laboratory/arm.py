@@ -295,7 +295,7 @@ class Arm:
         pull = self._pull(self.angle)
         self.muscle.commit(self.temperature, self.tensions)
         momentum = conditions.inertia * self._velocity + dt * (self._needed(self.angle) - pull)
-        # Sinking, the cables hold the arm beside the wires; rising, they hold the wires.
+        # Sinking, the cables hold the arm together with the wires; rising, they hold the wires.
         cable = conditions.cable
         rubbing = cable.before(pull) - pull if momentum > 0.0 else pull - cable.behind(pull)
         held = min(abs(momentum), dt * (conditions.coulomb + rubbing))

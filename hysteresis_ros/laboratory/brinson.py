@@ -22,7 +22,8 @@ paper's constants) martensite begins to form on the line of A_s.
 
 The constants are the paper's, after measurements of Dye (1990) on NiTi. That wire has no stroke
 under less than 100 MPa. The specimens of the laboratory are trained: an internal stress that
-training has left acts on the transformation beside the applied one.
+training has left acts on the transformation in addition to the
+applied one.
 """
 
 import dataclasses

@@ -364,7 +364,7 @@ class Simulator:
             if asked is not None:
                 read = chain.rows_read(asked[trial.rows], trial.inputs)
                 if chain.break_time < np.inf:
-                    read = read | _beside(trial.inputs.clock, chain.break_time)
+                    read = read | _rows_around(trial.inputs.clock, chain.break_time)
                 rows.append(balanced_rows(columns[-1][:3], read, spacing))
         kept = [own[:, one] for own, one in zip(columns, rows)] if rows else columns
         ends = np.cumsum([own.shape[1] for own in kept])
@@ -394,7 +394,7 @@ class Simulator:
         return Response(angles, outputs, drive_squared, inputs, past.rest)
 
 
-def _beside(clock: np.ndarray, time: float) -> np.ndarray:
+def _rows_around(clock: np.ndarray, time: float) -> np.ndarray:
     """Return whether each row of a trial (rows,) is the last before a time or the first after."""
     found = np.zeros(len(clock), dtype=bool)
     after = int(np.searchsorted(clock, time, 'right'))

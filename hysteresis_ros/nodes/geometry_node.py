@@ -8,10 +8,10 @@ limits or out of the linkage's reach is not passed on: the last good reference s
 log and diagnostics say why. With a model file, the effects of the arm and of its encoder that the
 model knows are undone here, the muscle's own in `compensator_node`.
 
-Beside single targets it takes `target_trajectory` and a stream of `joint_commands`, as a joint
-trajectory controller of ros2_control sends it; the last message counts, whatever its topic. These
-move the target no faster than ``maximum_speed``. When a stream ends without a word, the muscle is
-switched off after ``command_timeout``. The target at each time is published as
+In addition to single targets it takes `target_trajectory` and a stream of `joint_commands`, as a
+joint trajectory controller of ros2_control sends it; the last message counts, whatever its topic.
+These move the target no faster than ``maximum_speed``. When a stream ends without a word, the
+muscle is switched off after ``command_timeout``. The target at each time is published as
 `target_joint_states`.
 """
 

@@ -248,7 +248,7 @@ def waterfall(steps: Sequence[tuple[str, float]], floor: float | None, quantity:
     steps : list of (str, float)
         What the model had and its RMSE, in the unit of files; the first without the effects.
     floor : float or None
-        RMSE that the noise leaves; None where it is not known.
+        RMSE of the noise alone; None where it is not known.
     quantity : str
         The response.
 

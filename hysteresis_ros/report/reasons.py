@@ -116,7 +116,7 @@ def _alone(found: Diagnosis, row: dict[str, Any], quantity: str) -> str:
 
 
 def _errors(other: float, best: float, quantity: str) -> str:
-    """Put an error beside that of the answer."""
+    """Compare an error with that of the answer."""
     unit, scale = shown(quantity)
     text = f'{number(scale * other)} {unit} instead of {number(scale * best)} {unit}'
     if best > 0.0 and other > 1.5 * best:
