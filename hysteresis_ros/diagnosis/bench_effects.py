@@ -22,6 +22,7 @@ from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, measure
+from hysteresis_ros.workers import one_blas_thread
 
 if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
@@ -33,6 +34,7 @@ def _silent(items: Iterable, total: int) -> Iterable:
     return items
 
 
+@one_blas_thread()
 def add_effects(model: MuscleModel, length: Measurement, force: Measurement | None = None,
                 names: Sequence[str] | None = None, length_trials: Sequence[float] | None = None,
                 force_trials: Sequence[float] | None = None, jobs: int = 1,
