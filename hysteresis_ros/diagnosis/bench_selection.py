@@ -96,9 +96,7 @@ class BenchSelection:
         """Fit every effect by itself, grow sets from the best, and compare what they predict."""
         fits = self._begun_where_larger_ended(
             self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
-        errors = {frozenset(fit.names): self.fitter.error(fit.predicted) for fit in fits}
-        self.tried = self._with_other_forms(self._in_parallel(_judged, self.fitter, [
-            fit for fit in fits if self._all_help(fit, errors)]))
+        self.tried = self._judge(fits, self._in_other_forms(fits))
         self.alone = sorted((fit for fit in self.tried if len(fit.effects) == 1), key=self.error)
         values = self._significance(self.tried, self.base)
         self.p_values = {fit.names: float(value) for fit, value in zip(self.tried, values)}
@@ -137,23 +135,32 @@ class BenchSelection:
                 found[names] = fit
         return list(found.values())
 
-    def _with_other_forms(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Return fits, the best of each size with another form where held-out rows ask for it."""
+    def _in_other_forms(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Return the best fit of each size in the other forms that its effects can have."""
         best: dict[int, Fit] = {}
-        for fit in sorted(fits, key=self.typical_error):
+        for fit in sorted(fits, key=lambda one: self.fitter.error(one.predicted)):
             if other_forms(fit.effects):
                 best.setdefault(len(fit.effects), fit)
-        variants = [
+        return self._in_parallel(_fitted, self.fitter, [
             [usual([effect], self.problem.kind)[0].with_values(**forms[effect.id])
              if effect.id in forms else effect for effect in fit.effects]
-            for fit in best.values() for forms in other_forms(fit.effects)]
-        found = {fit.names: fit for fit in fits}
-        fitted = self._in_parallel(_fitted, self.fitter, variants)
-        for fit in self._in_parallel(_judged, self.fitter, fitted):
-            before = found[fit.names]
-            factor = np.inf if before.implausible() else 1.0 - self.settings.practical
-            if (self.typical_error(fit) < factor * self.typical_error(before)
-                    and not fit.implausible() and self._determines(fit)):
+            for fit in best.values() for forms in other_forms(fit.effects)])
+
+    def _judge(self, fits: Sequence[Fit], variants: Sequence[Fit]) -> list[Fit]:
+        """
+        Return fits that could be an answer, and single effects, with their held-out rows.
+
+        Those with another form of an equation only where held-out rows ask for it.
+        """
+        errors = {frozenset(fit.names): self.fitter.error(fit.predicted) for fit in fits}
+        found = {fit.names: fit for fit in self._in_parallel(_judged, self.fitter, [
+            fit for fit in fits if len(fit.effects) == 1
+            or self._all_help(fit, errors) and _says_more(fit)])}
+        for fit in self._in_parallel(_judged, self.fitter, [
+                fit for fit in variants if _says_more(fit) and self._determines(fit)]):
+            simpler = found.get(fit.names)
+            if simpler is None or simpler.implausible() or self.typical_error(fit) < (
+                    1.0 - self.settings.practical) * self.typical_error(simpler):
                 found[fit.names] = fit
         return list(found.values())
 
@@ -447,6 +454,11 @@ def _judged(fitter: BenchFitter, fit: Fit) -> Fit | None:
     with np.errstate(all='ignore'):
         fit = fitter.cross_validate(fit)
         return fit if np.all(np.isfinite(fit.held_out)) else None
+
+
+def _says_more(fit: Fit) -> bool:
+    """Whether a fit could be an answer, and none of its effects has vanished."""
+    return not fit.implausible() and not any(map(_vanished, fit.effects))
 
 
 def _vanished(effect: Effect) -> bool:
