@@ -143,7 +143,7 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
             return np.inf, fitted_effects
         if vague:
             others = [one for one in fit.effects if one.id != vague[0].id]
-            return located(fitter, others, vague[0], practical) or (np.inf, fitted_effects)
+            return located(fitter, others, vague[0]) or (np.inf, fitted_effects)
         return held_out(fit), fitted_effects
 
     # Alone they have to help; together with one that was found they only must not harm.

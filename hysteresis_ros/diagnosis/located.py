@@ -16,16 +16,19 @@ import numpy as np
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.effects import Effect
 
-# Values over the physical range at which held-out rows are predicted.
-VALUES = 7
+# Values over the physical range at which held-out rows are predicted, and of the posterior density.
+VALUES, POSTERIOR = 7, 601
 
 
-def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect, practical: float
+def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
             ) -> tuple[float, list[Effect]] | None:
     """
-    Return the effects with the value of the last one that predicts held-out rows best.
+    Return the effects with the most probable value of the last one, given held-out rows.
 
-    None where held-out rows do not determine the value, either.
+    Beforehand every value of the plausible range is as likely as another, on a logarithmic scale.
+    The errors of held-out rows have an unknown variance and are as many as there are blocks of
+    rows, so that the likelihood goes with their root mean square to the power of minus that number.
+    None where held-out rows speak for an end of the range: for no effect, or for one beyond it.
 
     Parameters
     ----------
@@ -35,8 +38,6 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect, practi
         Effects that are fitted for every value.
     effect : Effect
         The other one, of one positive parameter.
-    practical : float
-        Share by which the error has to be larger outside the parameter's interval.
 
     Returns
     -------
@@ -63,19 +64,15 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect, practi
     between = np.sqrt(values[best - 1:best + 1] * values[best:best + 2])
     values = np.insert(values, [best, best + 1], between)
     errors = np.insert(errors, [best, best + 1], [error_at(value) for value in between.tolist()])
-    best = int(np.argmin(errors))
-    most = (1.0 + practical) * errors[best]
-    ends = []
-    for side in (slice(best, None, -1), slice(best, None)):
-        inside, there = errors[side], np.log(values[side])
-        beyond = np.flatnonzero(inside > most)
-        # It has to rise, and to stay there: else it is noise that has a minimum.
-        if len(beyond) == 0 or np.any(inside[beyond[0]:] <= most):
-            return None
-        pair = slice(beyond[0] - 1, beyond[0] + 1)
-        ends.append(float(np.exp(np.interp(most, inside[pair], there[pair]))))
-    value = float(values[best])
+    # Between the values that were tried the logarithm of the error is a line.
+    fine = np.linspace(np.log(values[0]), np.log(values[-1]), POSTERIOR)
+    density = -len(np.unique(fitter.problem.block)) * np.interp(
+        fine, np.log(values), np.log(errors))
+    below = np.cumsum(np.exp(density - density.max()))
+    low, high = np.exp(np.interp([0.025, 0.975], below / below[-1], fine))
+    value = float(np.exp(fine[np.argmax(density)]))
     other.fixed = [*fitter.fixed, effect.with_values(**{name: value})]
+    fit = other.fit(known)
     found = effect.with_values(**{name: value})
-    found.intervals[name] = ends[0], ends[1]
-    return float(errors[best]), [*other.with_intervals(other.fit(known)), found]
+    found.intervals[name] = float(low), float(high)
+    return (other.error(other.cross_validate(fit).held_out), [*other.with_intervals(fit), found])
