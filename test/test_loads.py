@@ -113,6 +113,26 @@ def test_a_clean_arm_is_not_faulty_by_a_bench_of_two_loads(two_loads):
     assert found.verdict in ('adequate', 'not_excited')
 
 
+@pytest.mark.long
+@pytest.mark.parametrize('seed', [3, 4, 5])
+@pytest.mark.parametrize('trials', [[0, 3], [0, 1]], ids=['1.2 and 7.1 N', '1.2 and 3.1 N'])
+@pytest.mark.parametrize('effects', ['none', 'auto'])
+def test_no_effect_of_a_clean_arm_is_named_by_a_bench_of_two_loads(seed, trials, effects):
+    """
+    Neither beyond the bench's loads nor between two that are far apart, whatever the bench proves.
+
+    None of 12: if one in three were named, that would happen in less than 1 % of all cases.
+    """
+    length, force = tables(seed=seed)
+    chosen = {'length_trials': trials, 'force_trials': [0]}
+    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **chosen).model
+    if effects == 'auto':
+        model, _ = add_effects(model, length, force, **chosen)
+    recording, = tables(['train.csv'], 'arm-steps', seed)
+    found = diagnose(model, [recording.select([0, 1])], seed=1)
+    assert (found.verdict, found.missing) == ('adequate', [])
+
+
 @pytest.mark.parametrize('names, factor', [
     (['payload_mass'], 100.0), (['forearm_length'], 16.0),
     (['payload_mass', 'forearm_mass', 'gravity'], 0.1)])
