@@ -127,6 +127,21 @@ def runs(model, trials=3, rows=ROWS, seed=0, dt=30.0, sizes=None):
     return Measurement.from_columns({**columns, 'angle': angle})
 
 
+def autoregressive(rng, trials, rows, rho):
+    """Return AR(1) noise of unit size, trial by trial, shape (trials * rows,)."""
+    noise = rng.standard_normal((trials, rows))
+    for row in range(1, rows):
+        noise[:, row] = rho * noise[:, row - 1] + math.sqrt(1.0 - rho ** 2) * noise[:, row]
+    return noise.ravel()
+
+
+def with_noise(measured, noise):
+    """Return a recording with more on its response."""
+    name = measured.response
+    return Measurement.from_columns(
+        {**measured.columns, name: measured.column(name) + noise}, source=measured.source)
+
+
 def heavier_arm(folder, grams, recordings):
     """Fill a folder with a model and recordings (name to seed) of an arm that carries more."""
     base = bicep_model()
