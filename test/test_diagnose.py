@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 
+from model_support import autoregressive, with_noise
 import numpy as np
 import pytest
 
@@ -181,12 +182,6 @@ def test_two_effects_that_one_could_explain_are_found_as_a_pair(model):
     assert {'supply_sag', 'pwm_dead_zone'} <= reported(found)
 
 
-def with_noise(measured, noise):
-    """Return a recording with more on its angle."""
-    return Measurement.from_columns(
-        {**measured.columns, 'angle': measured.column('angle') + noise}, source=measured.source)
-
-
 def of_the_model(model, train):
     """Return a recording as the model itself has it."""
     return Measurement.from_columns({**train.columns, 'angle': model.predict(train)})
@@ -207,10 +202,7 @@ def test_two_degrees_of_white_noise_on_the_models_own_response_are_adequate(mode
 def test_noise_that_is_slow_is_not_taken_for_an_effect(model, seed):
     """One degree that changes from row to row by little: a drift of whatever cause has no name."""
     train, _ = recordings({})
-    rng = np.random.default_rng(seed)
-    noise = rng.standard_normal(train.rows)
-    for row in range(1, train.rows):
-        noise[row] = 0.9 * noise[row - 1] + math.sqrt(1.0 - 0.81) * noise[row]
+    noise = autoregressive(np.random.default_rng(seed), 1, train.rows, 0.9)
     found = diagnose(model, [with_noise(train, math.radians(1.0) * noise)], seed=SEED)
     assert found.missing == []
 
