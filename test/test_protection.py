@@ -102,7 +102,7 @@ def test_soft_start_rises_from_off_and_only_from_off():
     voltages = [protection.limit(6.0, 10.0 + 0.1 * step)[0] for step in range(5)]
     assert voltages == pytest.approx([0.0, 2.0, 4.0, 6.0, 6.0])
     assert protection.limit(1.0, 10.5)[0] == 1.0 and protection.limit(6.0, 10.6)[0] == 6.0
-    protection.rest()
+    protection.begin_softly()
     assert protection.limit(6.0, 11.0, 0.05) == (pytest.approx(1.0), '', True)
     assert protection.limit(0.0, 11.1) == (0.0, '', False)
     assert protection.limit(6.0, 11.2)[0] == 0.0

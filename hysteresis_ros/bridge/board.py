@@ -472,10 +472,10 @@ class Board:
         self._ramping = False
         supply = self._supply
         if self._target is None or supply is None or self._expired():
-            self.protection.rest()
+            self.protection.begin_softly()
             return 0.0
         if self._late():
-            self.protection.rest()
+            self.protection.begin_softly()
             self._limit = 'the telemetry is late: output off until it comes again'
             return 0.0
         off = abs(supply - self._nominal_supply)

@@ -185,7 +185,7 @@ class Protection:
         self._anchor = self._cold = None
         self._off_since = None
 
-    def rest(self) -> None:
+    def begin_softly(self) -> None:
         """Take note that nothing is asked for: the next start is a soft one."""
         self._start = None
 
@@ -217,7 +217,7 @@ class Protection:
         """
         limits, reason, ahead = self.limits, '', max(ahead, AHEAD)
         if voltage == 0.0:
-            self.rest()
+            self.begin_softly()
             return voltage, '', False
         hottest = strongest = math.inf
         if limits.maximum_temperature:

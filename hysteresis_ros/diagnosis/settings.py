@@ -15,7 +15,7 @@ class Settings:
     Attributes
     ----------
     prior : float
-        Probability of each effect beforehand: about one of a catalogue of thirty.
+        Probability of each effect beforehand: about one of a catalogue of forty.
     most_effects : int
         Effects in one set; more are not told apart by one recording.
     most_on_bench : int
