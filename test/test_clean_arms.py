@@ -15,9 +15,9 @@ from hysteresis_ros.measurements import Measurement
 TRIALS = {'length_trials': range(4), 'force_trials': [0]}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize('muscle', ['lagoudas', 'tanaka'])
-@pytest.mark.parametrize('seed', [6301, 6302])
+@pytest.mark.parametrize('seed', [6301, pytest.param(6302, marks=pytest.mark.long)])
 def test_a_clean_arm_is_adequate_whatever_its_wires_are(muscle, seed):
     """
     With what its bench proves; on a whole recording of four settled trials.

@@ -113,8 +113,9 @@ def test_a_clean_arm_is_not_faulty_by_a_bench_of_two_loads(two_loads):
     assert found.verdict in ('adequate', 'not_excited')
 
 
-@pytest.mark.long
-@pytest.mark.parametrize('seed', [3, 4, 5])
+@pytest.mark.slow
+@pytest.mark.parametrize('seed', [3, *(
+    pytest.param(seed, marks=pytest.mark.long) for seed in (4, 5))])
 @pytest.mark.parametrize('trials', [[0, 3], [0, 1]], ids=['1.2 and 7.1 N', '1.2 and 3.1 N'])
 @pytest.mark.parametrize('effects', ['none', 'auto'])
 def test_no_effect_of_a_clean_arm_is_named_by_a_bench_of_two_loads(seed, trials, effects):

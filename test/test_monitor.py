@@ -194,17 +194,18 @@ def test_a_reset_outdates_what_is_being_diagnosed():
 @pytest.mark.slow
 def test_the_recording_gives_the_same_answer(tmp_path):
     """Its history leads the model to where the arm was; what the monitor judges is judged."""
-    arm = Arm(BAND, *[Outcome(found('unknown'), '', 1.0)] * 40)
+    arm = Arm(BAND, *[Outcome(found('unknown'), '', 1.0)] * 60)
     with pytest.raises(HysteresisError, match='no hold of the arm has ended yet'):
         arm.monitor.save(str(tmp_path), NOW)
     arm.hold(drives(12))
-    arm.hold(drives(25, 2), 0.15)
+    # Of 24 rows a constant could be a drift, too (p = 0.06).
+    arm.hold(drives(40, 2), 0.15)
     path = arm.monitor.save(str(tmp_path / 'new'), NOW)
     assert path == tmp_path / 'new' / 'arm_20260102T030405_000000.csv'
     measurement = read_measurement(path)
     assert measurement.settled and measurement.trials.tolist() == [0.0]
     history = measurement.columns['history']
-    assert 0 < history.sum() < 12 and (history == 0.0).sum() == 24
+    assert 0 < history.sum() < 12 and (history == 0.0).sum() == 39
     again = diagnose(arm.model, [measurement])
     assert again.missing == ['encoder_offset']
     assert again.rmse_before == pytest.approx(0.15, rel=1e-3)

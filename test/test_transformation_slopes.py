@@ -3,7 +3,6 @@
 """A loop as wide as its load says: on the bench, on the arm, in the inverse, and found."""
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.laboratory import sequences
 from hysteresis_ros.laboratory.bench import Bench
 from hysteresis_ros.laboratory.conditions import Conditions
-from hysteresis_ros.laboratory.grain_wire import GrainMaterial
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import specimen
 from hysteresis_ros.measurements import Measurement
@@ -157,29 +155,3 @@ def test_it_makes_no_sense_without_a_load_or_for_a_muscle_that_extends():
     assert kind.available(there)
     assert not kind.available(there._replace(load=0.0))
     assert not kind.available(there._replace(sign=1))
-
-
-@dataclasses.dataclass(frozen=True)
-class GaussianGrowth(GrainMaterial):
-    """The stroke grows with the square of a small load: no form that the catalogue has."""
-
-    def transformation_strain(self, stress):
-        """Return H(sigma)."""
-        return self.largest_strain - (self.largest_strain - self.strain_without_load) * math.exp(
-            -(stress / (1.3 * self.orienting_stress)) ** 2)
-
-
-@pytest.mark.slow
-def test_growth_of_another_form_has_the_right_name():
-    fields = dataclasses.asdict(specimen(5))
-    fields['grains'] = specimen(5).grains
-    force, length = bench_tables(GaussianGrowth(**fields), 5)
-    trials = {'length_trials': range(4), 'force_trials': [0]}
-    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
-    extended, added = add_effects(model, length, force, **trials)
-    names = {effect.id for effect in added}
-    assert {'stress_dependence', 'stress_dependent_strain'} <= names
-    assert not names & {'r_phase', 'fatigue'}
-    before, after = (one.metrics['length']['verification']['model']['mean_percent']
-                     for one in (model, extended))
-    assert after < 0.6 and after < 0.5 * before

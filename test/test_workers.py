@@ -15,7 +15,10 @@ import numpy as np
 import pytest
 import threadpoolctl
 
+from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.workers import delayed, in_parallel, one_blas_thread
 
 # Four each: their own time is a part of a second.
@@ -103,6 +106,26 @@ def test_a_diagnosis_leaves_blas_one_thread(three):
     model = bicep_model()
     run.columns['angle'] = model.predict(run) + rng.normal(0.0, 0.002, len(voltage))
     diagnose(model, [run], progress=progress)
+    assert seen and set(seen) == {1}
+    assert set(threads()) == {3}
+
+
+def test_adding_effects_to_a_bench_leaves_blas_one_thread(three, monkeypatch):
+    """After the diagnosis, too: two threads that wait for a busy core take 25 times as long."""
+    seen, fit = [], BenchFitter.fit
+
+    def watched(self, *args, **options):
+        seen.extend(threads())
+        return fit(self, *args, **options)
+
+    monkeypatch.setattr(BenchFitter, 'fit', watched)
+    drive = np.concatenate([np.linspace(0.0, 6.0, 15), np.linspace(6.0, 0.0, 15)])
+    model, loads = bicep_model(), (1.0, 3.0, 5.0)
+    table = Measurement.from_columns({
+        'trial': np.repeat(np.arange(3.0), 30), 'step': np.tile(np.arange(30.0), 3),
+        'voltage': np.tile(drive, 3), 'force': np.repeat(loads, 30), 'length': np.zeros(90)})
+    table.columns['length'] = model.predict(table)
+    add_effects(model, table)
     assert seen and set(seen) == {1}
     assert set(threads()) == {3}
 
