@@ -27,9 +27,7 @@ def noisy(run, rho, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('error', [4e-4, pytest.param(4e-5, marks=pytest.mark.xfail(
-    strict=True, reason='173 of 200: the value is that of least squares, whose error is larger '
-    'than that of the most probable one, which the interval knows'))])
+@pytest.mark.parametrize('error', [4e-4, 4e-5])
 def test_intervals_under_noise_that_lasts_hold_the_truth_as_often_as_they_say(error):
     """
     Of 200 runs 181 to 197: what 95 % gives with a probability of 99 %.

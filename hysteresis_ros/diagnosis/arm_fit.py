@@ -364,16 +364,18 @@ class Fitter:
         Return a fit whose effects predict best: by least squares, whatever the covariance.
 
         Where an effect's equation is not quite that of nature, the values that predict best are
-        not the most probable ones; what they differ by counts in the intervals.
+        not the most probable ones. Their intervals contain those of the most probable ones, which
+        is what the rows say where their errors last.
         """
         if not len(fit.vector):
             return fit
         white = self.covariance.white(max(self.error(fit.predicted), self.covariance.resolution))
         found, = self.fit([fit.effects], white) or [fit]
-        away = found.vector - fit.vector
+        size = np.sqrt(np.maximum(np.diag(fit.spread), 1e-300))
+        wider = 1.0 + np.abs(found.vector - fit.vector) / (FACTOR * size)
         return dataclasses.replace(
             found, log_evidence=fit.log_evidence, values=fit.values,
-            spread=fit.spread + np.outer(away, away) / FACTOR ** 2)
+            spread=fit.spread * np.outer(wider, wider))
 
     def least_error(self, fit: Fit) -> float:
         """Return the root mean square error after one step towards the least squares."""
