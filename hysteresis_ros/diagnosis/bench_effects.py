@@ -131,24 +131,31 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
     def held_out(fit: Fit) -> float:
         return fitter.error(fitter.cross_validate(fit).held_out)
 
-    def tried(effects: Sequence[Effect]) -> tuple[float, list[Effect]]:
-        fit = fitter.fit(effects)
-        fitted_effects = fitter.with_intervals(fit)
-        vague = [one for one in fitted_effects if not_determined(one, 'bench')
-                 and (one.universal or one.id not in names)]
-        # Where no effect explains the load, held-out loads would tell of what is missing. And what
-        # was found is not to be given up for what could stand for it.
-        if (fit.implausible() or len(vague) > (1 if found else 0)
-                or any(one.id in names for one in vague)):
-            return np.inf, fitted_effects
-        if vague:
-            others = [one for one in fit.effects if one.id != vague[0].id]
-            return located(fitter, others, vague[0]) or (np.inf, fitted_effects)
-        return held_out(fit), fitted_effects
+    def vague(effects: Sequence[Effect]) -> list[Effect]:
+        return [one for one in effects if one.universal and not_determined(one, 'bench')]
 
     # Alone they have to help; together with one that was found they only must not harm.
     practical = Settings().practical
     largest = held_out(fitter.fit(found)) * ((1.0 + practical) if names else (1.0 - practical))
+
+    def tried(effects: Sequence[Effect]) -> tuple[float, list[Effect]]:
+        fit = fitter.fit(effects)
+        fitted_effects = fitter.with_intervals(fit)
+        new = [one.id for one in vague(fitted_effects) if one.id not in names]
+        # Where no effect explains the load, held-out loads would tell of what is missing.
+        if fit.implausible() or len(new) > (1 if found else 0):
+            return np.inf, fitted_effects
+        if not vague(fitted_effects):
+            error = held_out(fit)
+            # Fitted anew without a load, one more parameter may predict that load worse.
+            if error <= largest:
+                return error, fitted_effects
+        last = next(one for one in fit.effects if one.id == (new or [effects[-1].id])[0])
+        error, located_effects = located(
+            fitter, [one for one in fit.effects if one is not last], last) or (np.inf, [])
+        # What was found is not to be given up for what could stand for it.
+        return (np.inf if vague(located_effects) else error), located_effects
+
     for more in (rest, *([effect] for effect in rest)):
         error, effects = tried([*found, *more])
         if error > largest:

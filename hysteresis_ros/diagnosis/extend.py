@@ -15,6 +15,7 @@ from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.determined import not_determined, undetermined
 from hysteresis_ros.diagnosis.forms import with_best_forms
 from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.located import can_be_located
 from hysteresis_ros.diagnosis.observable import may_differ, observable, present, unaffected
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.selection import Selection
@@ -241,18 +242,23 @@ def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Mea
     The parameters, and what is raised, are those of `extend`; `known` are effects of these names
     that a diagnosis of the same bench has fitted before.
     """
-    problem, _, fits = _fitted(model, names, train)
-    added, _ = fits[-1]
-    if problem.refits:
-        added = _fitted_together(BenchFitter(problem.finer()), added, known)
+    problem, classes = _without(model, names, train)
+    added = (_fitted_together(problem, model, classes, known) if problem.refits
+             else _on_arm(problem, model, classes)[-1][0])
     completed = problem.completed([*unaffected(problem.model.effects, added), *added])
     return _stamped(completed, added, train, problem.kind), added
 
 
-def _fitted_together(fitter: BenchFitter, added: Sequence[Effect], known: Sequence[Effect]
-                     ) -> list[Effect]:
+def _fitted_together(problem: BenchProblem, model: MuscleModel, classes: Sequence[type[Effect]],
+                     known: Sequence[Effect]) -> list[Effect]:
     """Return the better fit of effects of a bench, with the simplest forms that do."""
-    added, kind = with_best_forms(fitter, added), fitter.problem.kind
+    fitter, kind = BenchFitter(problem.finer()), problem.kind
+    # What held-out rows have determined is not fitted again to rows that cannot tell it.
+    fixed = {effect.id for effect in known
+             if can_be_located(effect, kind) and not not_determined(effect, kind)}
+    if fixed:
+        return with_best_forms(fitter, known, fixed)
+    added = with_best_forms(fitter, _on_bench(problem, model, classes)[-1][0])
     if not known:
         return added
     rivals = [fitter.fit(effects, evaluations=EVALUATIONS, tolerance=TOLERANCE)
@@ -262,12 +268,7 @@ def _fitted_together(fitter: BenchFitter, added: Sequence[Effect], known: Sequen
     # A fit that runs out of the physical range explains something else.
     if best.implausible() and not any(effect.implausible() for effect in known):
         return with_best_forms(fitter, known, {effect.id for effect in known})
-    added = fitter.with_intervals(best)
-    vague = {effect.id for effect in added if not_determined(effect, kind)}
-    located = {effect.id for effect in known
-               if effect.id in vague and not not_determined(effect, kind)}
-    # What only held-out rows have determined is not fitted again.
-    return with_best_forms(fitter, known if located else added, located)
+    return with_best_forms(fitter, fitter.with_intervals(best))
 
 
 def _unobservable(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],

@@ -14,10 +14,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
-from hysteresis_ros.effects import Effect
+from hysteresis_ros.effects import Effect, Parameter
 
 # Values over the physical range at which held-out rows are predicted, and of the posterior density.
 VALUES, POSTERIOR = 7, 601
+
+
+def can_be_located(effect: Effect, kind: str) -> bool:
+    """Whether an effect has one parameter, which is positive, on a kind of measurement."""
+    free = _free(effect, kind)
+    return len(free) == 1 and free[0].log
+
+
+def _free(effect: Effect, kind: str) -> list[Parameter]:
+    return [parameter for parameter in effect.parameters if kind in parameter.kinds]
 
 
 def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
@@ -46,9 +56,9 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
     effects : list of Effect
         All, with intervals.
     """
-    free = [parameter for parameter in effect.parameters if fitter.problem.kind in parameter.kinds]
-    if len(free) != 1 or not free[0].log:
+    if not can_be_located(effect, fitter.problem.kind):
         return None
+    free = _free(effect, fitter.problem.kind)
     name = free[0].name
     other = BenchFitter(fitter.problem)
 
