@@ -13,6 +13,7 @@ rest.
 from __future__ import annotations
 
 import copy
+import functools
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -232,10 +233,14 @@ class ArmBalance:
             np.ascontiguousarray(column, dtype=float) for column in (x, dt, offset, factor)))[1:]
 
 
+@functools.lru_cache(maxsize=16)
 def statics_of(geometry: BicepGeometry) -> Statics:
-    """Return the arm that a geometry describes at rest, on the grid of angles."""
+    """Return the arm that a geometry describes at rest, on the grid of angles, read-only."""
     low, high = geometry.angle_range
-    return Statics.of(geometry, np.linspace(low, high, max(int((high - low) / GRID), 2)))
+    statics = Statics.of(geometry, np.linspace(low, high, max(int((high - low) / GRID), 2)))
+    for column in vars(statics).values():
+        column.setflags(write=False)
+    return statics
 
 
 def _line(statics: Statics, leverage: np.ndarray, friction: float, base: float, chain: Chain,

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import root
+from .clip import clip
 from .formation import keep, LOAD, parts, SIZE
 from .jit import remember_types
 from .lean import inlined, lean
@@ -71,7 +72,7 @@ def _looked_up(wires: Wires, values: np.ndarray, load: float) -> float:
     last = len(values) - 1
     if last == 0:
         return values[0]
-    place = min(max((load - wires.lightest) / wires.spacing, 0.0), float(last))
+    place = clip((load - wires.lightest) / wires.spacing, 0.0, float(last))
     k = min(int(place), last - 1)
     return values[k] + (place - k) * (values[k + 1] - values[k])
 
@@ -122,7 +123,7 @@ def _load_for(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, out
         if value * there < 0.0:
             near, here = far, there
         else:
-            here *= 0.5
+            here *= root.kept_share(there, value)
         far, there = point, value
         count += 1
     return far

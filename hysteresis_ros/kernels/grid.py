@@ -6,6 +6,9 @@ import numpy as np
 
 from .lean import lean
 
+# Intervals that are looked at along a straight line before a search by halves takes over.
+STRAIGHT = 4
+
 
 @lean
 def interval(grid: np.ndarray, column: int, value: float, near: int) -> int:
@@ -22,10 +25,23 @@ def interval(grid: np.ndarray, column: int, value: float, near: int) -> int:
 
     """
     last = len(grid) - 1
-    if 1 <= near <= last and ((near == 1 or grid[near - 1, column] <= value)
-                              and (near == last or value < grid[near, column])):
-        return near
     low, high = 1, last
+    k = min(max(near, low), high)
+    for _ in range(STRAIGHT):
+        below, above = grid[k - 1, column], grid[k, column]
+        if value < below:
+            high = k - 1
+        elif value >= above:
+            low = k + 1
+        else:
+            return k
+        if low >= high:
+            return min(max(low, 1), last)
+        if not below < above:
+            break
+        # Where a straight line through this interval would have the value.
+        way = (value - below) / (above - below)
+        k += int(min(max(way, float(low - k)), float(high - k)))
     while low < high:
         middle = (low + high) // 2
         if value < grid[middle, column]:

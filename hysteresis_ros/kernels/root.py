@@ -12,13 +12,15 @@ long as `searching`. The last place that was asked for is the root::
         point = proceed(memory, at, function(point))
 
 The search first steps outward until the sign changes, then goes on by false position that cannot
-stall at one end (the Illinois method), the fastest choice for a function without steep places.
+stall at one end (Anderson and Bjorck, BIT 13, 1973), the fastest choice for a function without
+steep places.
 """
 
 import math
 
 import numpy as np
 
+from .clip import clip
 from .lean import lean
 
 
@@ -54,7 +56,7 @@ def begin(memory: np.ndarray, at: int, start: float, here: float, step: float, l
 
     """
     memory[at + _NEAR], memory[at + _HERE] = start, here
-    memory[at + _FAR] = min(max(start + step, low), high)
+    memory[at + _FAR] = clip(start + step, low, high)
     memory[at + _STEP], memory[at + _LOW], memory[at + _HIGH] = step, low, high
     memory[at + _TOLERANCE] = tolerance
     memory[at + _PHASE], memory[at + _COUNT] = _OUTWARD, 0.0
@@ -87,7 +89,7 @@ def proceed(memory: np.ndarray, at: int, value: float) -> float:
         if value * memory[at + _THERE] < 0.0:
             memory[at + _NEAR], memory[at + _HERE] = far, memory[at + _THERE]
         else:
-            memory[at + _HERE] = 0.5 * here
+            memory[at + _HERE] = kept_share(memory[at + _THERE], value) * here
         memory[at + _FAR], memory[at + _THERE] = memory[at + _STEP], value
         return _next(memory, at)
     memory[at + _THERE] = value
@@ -102,7 +104,7 @@ def proceed(memory: np.ndarray, at: int, value: float) -> float:
     step = outward(near, here, far, value, memory[at + _STEP])
     memory[at + _NEAR], memory[at + _HERE] = far, value
     memory[at + _STEP] = step
-    memory[at + _FAR] = min(max(far + step, memory[at + _LOW]), memory[at + _HIGH])
+    memory[at + _FAR] = clip(far + step, memory[at + _LOW], memory[at + _HIGH])
     memory[at + _COUNT] += 1.0
     return memory[at + _FAR]
 
@@ -122,9 +124,23 @@ def outward(near: float, here: float, far: float, there: float, step: float) -> 
         The last step.
     """
     # A little further than the straight line through both says.
-    fall, least = here - there, abs(step)
+    fall, last = here - there, abs(step)
     reach = abs(1.3 * there / fall * (far - near)) if fall * here > 0.0 else math.inf
-    return math.copysign(min(max(reach, least), 8.0 * least), step)
+    return math.copysign(clip(reach, 0.1 * last, 8.0 * last), step)
+
+
+@lean
+def kept_share(before: float, value: float) -> float:
+    """
+    Return what is kept of the value at the other end where two in a row have the same sign.
+
+    Parameters
+    ----------
+    before, value : float
+        The function's values at the last place but one and at the last.
+    """
+    # On a plateau the other end would come next, again and again.
+    return clip(1.0 - value / before, 0.25, math.inf)
 
 
 @lean

@@ -16,6 +16,7 @@ from .arm import (
     Arm, INSIDE, LENGTH, LEVERAGE, LOOP, LOOSER, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD,
     REST_SEARCH, SCALE, State, STRETCH, SWING_GAIN, THETA)
 from .bundle import TYPICAL_COMPLIANCE
+from .clip import clip
 from .formation import keep, parts
 from .lean import inlined, lean
 from .load_play import held
@@ -102,7 +103,7 @@ def _lacking(arm: Arm, state: State, u: float, x: float, offset: float, factor: 
     state.motion[NEAR_LENGTH] = k
     share = (length - arm.grid[k - 1, LENGTH]) / (
         arm.grid[k, LENGTH] - arm.grid[k - 1, LENGTH])
-    share = min(max(share, 0.0), 1.0)
+    share = clip(share, 0.0, 1.0)
     return k, share, _needed(arm, k, share, drag, slope, grip) - load
 
 
@@ -113,7 +114,7 @@ def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: f
     n, part = _load_at(arm, state, u, x)
     load = (n - 1 + part) * arm.spacing
     # A loose muscle's load goes on falling, so that the root can be found.
-    part = max(part, 0.0)
+    part = clip(part, 0.0, math.inf)
     scale = grid.between(arm.loads, SCALE, n, part)
     output = peek(arm.wires.table, state.memories[0], _input(arm, state, u, x))
     strained, held = parts(arm.wires.kept, state.muscles, 0, output - arm.base)
@@ -136,7 +137,7 @@ def _input(arm: Arm, state: State, u: float, x: float) -> float:
     if not arm.plays:
         return u
     n, part = _load_at(arm, state, u, x)
-    loop = max(grid.between(arm.loads, LOOP, n, part), 0.0)
+    loop = clip(grid.between(arm.loads, LOOP, n, part), 0.0, math.inf)
     return held(last_input(arm.wires.table, state.memories[0]), u, loop)
 
 
