@@ -226,6 +226,18 @@ def test_an_effect_more_has_to_explain_more_than_chance_given_the_first(
         'creep' not in missing)
 
 
+@pytest.mark.parametrize('lasting, missing', [
+    (0.0, ['creep', 'valve_lag']), (0.98, ['valve_lag'])])
+def test_rows_whose_errors_last_count_less(monkeypatch, lasting, missing):
+    """What held-out rows of a few trials say is little where one error tells the next."""
+    monkeypatch.setattr(significance, 'autocorrelation', lambda *args: lasting)
+    found = lagging_and_creeping()
+    assert sorted(found.missing) == missing
+    reason = found.not_excited.get('creep', '')
+    assert ('given the others it acts with a probability of 0.' in reason) == (
+        'creep' not in missing)
+
+
 def test_creep_of_a_polymer_shows_and_is_plausible():
     """Steps so far all go on creeping; what follows the drive at once is the operator's."""
     found = found_in(table(creeping), ('creep', 'fatigue', 'latency'))

@@ -4,7 +4,8 @@
 
 import dataclasses
 
-from model_support import arm_run, bicep_model, effect_of, GEOMETRY, ROWS, runs
+from model_support import (
+    arm_run, autoregressive, bicep_model, effect_of, GEOMETRY, ROWS, runs)
 import numpy as np
 import pytest
 
@@ -16,7 +17,7 @@ from hysteresis_ros.diagnosis.residual import (
     heteroscedasticity_p_value, predictable, shares, unexplained_signal)
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.diagnosis.significance import (
-    block_sums, cosines, gain_interval, paired_p_values, residualise)
+    autocorrelation, block_sums, cosines, gain_interval, paired_p_values, residualise)
 from hysteresis_ros.diagnosis.verdict import add_signatures, in_order, next_experiment
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement
@@ -27,6 +28,17 @@ def problem():
     """Return rows of a model without any error."""
     model = bicep_model()
     return problem_for(model, [runs(model)])
+
+
+@pytest.mark.parametrize('rho', [0.0, 0.5, 0.9])
+def test_autocorrelation_is_that_of_each_trial(rho):
+    noise = autoregressive(np.random.default_rng(1), 40, 200, rho)
+    trial = np.repeat(np.arange(40), 200)
+    assert autocorrelation(noise, trial) == pytest.approx(rho, abs=0.02)
+    assert autocorrelation(-noise, trial) == autocorrelation(noise, trial)
+    # A trial of one row has none before it.
+    assert autocorrelation(noise, np.arange(8000)) == 0.0
+    assert autocorrelation(np.where(np.arange(10) % 2, 1.0, -1.0), np.zeros(10)) == 0.0
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():

@@ -91,12 +91,14 @@ class BenchSelection:
         self.sets: list[Fit] = []
         self.tried: list[Fit] = []
         self.p_values: dict[tuple[str, ...], float] = {}
+        self._independent_rows = float(len(np.unique(self.problem.block)))
 
     def run(self) -> None:
         """Fit every effect by itself, grow sets from the best, and compare what they predict."""
         fits = self._begun_where_larger_ended(
             self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
         self.tried = self._judge(fits, self._in_other_forms(fits))
+        self._independent_rows = self._count_independent()
         self.alone = sorted((fit for fit in self.tried if len(fit.effects) == 1), key=self.error)
         values = self._significance(self.tried, self.base)
         self.p_values = {fit.names: float(value) for fit, value in zip(self.tried, values)}
@@ -217,12 +219,13 @@ class BenchSelection:
 
     def _leave_out_chance(self) -> bool:
         """
-        Leave out an effect that, given the others of the set, explains no more than chance.
+        Leave out an effect that, given the others of the set, may well be none.
 
-        It was the best of all that could have been added to the others, which are tested together.
+        It explains no more than chance: it was the best of all that could have been added to the
+        others, which are tested together. Or held-out rows make the others alone more probable.
         What every loaded muscle has needs no such proof.
         """
-        values: dict[str, tuple[float, Fit]] = {}
+        doubts: dict[str, tuple[float, str, Fit]] = {}
         for effect in self.found.effects:
             others = frozenset(self.found.names) - {effect.id}
             smaller = next((fit for fit in [self.base, *self.tried]
@@ -232,13 +235,19 @@ class BenchSelection:
                 continue
             added = [self.found, *(fit for fit in self.tried if fit is not self.found and (
                 len(fit.names) == len(self.found.names) and others < frozenset(fit.names)))]
-            values[effect.id] = float(self._significance(added, smaller)[0]), smaller
-        name = max(values, key=lambda one: values[one][0], default=None)
-        if name is None or values[name][0] <= SIGNIFICANCE:
+            value = float(self._significance(added, smaller)[0])
+            absent = 1.0 / (1.0 + math.exp(min(self._log_odds(self.found, smaller), 700.0)))
+            if value > SIGNIFICANCE:
+                doubts[effect.id] = (
+                    1.0 + value, f'it explains no more than chance (p = {value:.2f})', smaller)
+            elif absent > 0.5:
+                doubts[effect.id] = (
+                    absent, f'it acts with a probability of {1.0 - absent:.2f}', smaller)
+        if not doubts:
             return False
-        value, smaller = values[name]
-        self._leave_out(name, 'given the others it explains no more than chance '
-                        f'(p = {value:.2f})', smaller)
+        name = max(doubts, key=lambda one: doubts[one][0])
+        _, reason, smaller = doubts[name]
+        self._leave_out(name, f'given the others {reason}', smaller)
         return True
 
     def _leave_out_unstable(self) -> bool:
@@ -340,11 +349,25 @@ class BenchSelection:
 
     def _log_odds(self, fit: Fit, base: Fit) -> float:
         """Return the log posterior odds of a fit against another one; see `probabilities`."""
-        count = len(np.unique(self.problem.block))
         prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
         before, after = (max(self.typical_error(one, self.problem.noise), 1e-300)
                          for one in (base, fit))
-        return prior * (len(fit.effects) - len(base.effects)) + count * math.log(before / after)
+        return (prior * (len(fit.effects) - len(base.effects))
+                + self._independent_rows * math.log(before / after))
+
+    def _count_independent(self) -> float:
+        """
+        Return as how many independent rows all rows count, at most one for each block.
+
+        Errors last from row to row, of the model as of a sensor that drifts: of an autoregressive
+        process n rows say what n (1 - rho) / (1 + rho) independent ones would. What lasts is seen
+        where effects have explained most.
+        """
+        best = min([self.base, *self.tried], key=self.typical_error)
+        rho = significance.autocorrelation(
+            self.problem.measured - best.held_out, self.problem.trial)
+        return min(len(np.unique(self.problem.block)),
+                   len(best.held_out) * (1.0 - rho) / (1.0 + rho))
 
     def _gains(self, fit: Fit, base: Fit) -> np.ndarray:
         """
@@ -400,8 +423,8 @@ class BenchSelection:
         """
         Return the tried sets with the probability that their held-out errors give them.
 
-        As many independent rows as there are blocks, of unknown variance on each load: the
-        likelihood goes with the typical error to the power of minus that number.
+        So many independent rows of unknown variance on each load: the likelihood goes with the
+        typical error to the power of minus that number.
         """
         fits = [self.base, *self.sets]
         logs = np.array([self._log_odds(fit, self.base) for fit in fits])
