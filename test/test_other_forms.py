@@ -1,0 +1,114 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Physics that acts by another equation than the catalogue's has the right name all the same."""
+
+import dataclasses
+import math
+
+from hidden_cases import found_in, TRIALS
+from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.laboratory import still_air
+from hysteresis_ros.laboratory.arm import Arm
+from hysteresis_ros.laboratory.grain_wire import GrainMaterial, GrainWire
+from hysteresis_ros.laboratory.linkage import GEOMETRY
+from hysteresis_ros.laboratory.parallel_wires import ParallelWires
+from hysteresis_ros.laboratory.plant import specimen
+import pytest
+from test_transformation_slopes import bench_tables
+
+pytestmark = pytest.mark.slow
+
+
+def named(found):
+    """Return what is said to be missing, and what could as well be in its place."""
+    return {*found.missing, *(name for others in found.alternatives for name in others)}
+
+
+@pytest.fixture
+def harder_to_start(monkeypatch):
+    """Dry friction that is half as large again until the arm slides (Stribeck 1902)."""
+    slide = Arm._find_balance
+
+    def find_balance(self, dt):
+        if abs(self._pull(self.angle) - self._needed(self.angle)) <= 1.5 * self.conditions.coulomb:
+            self.muscle.commit(self.temperature, self.tensions)
+        else:
+            slide(self, dt)
+    monkeypatch.setattr(Arm, '_find_balance', find_balance)
+
+
+def test_friction_that_is_larger_at_rest_is_friction(harder_to_start):
+    found = found_in({'coulomb_friction': 1.0}, 5, protocol='arm-steps')
+    assert found.verdict == 'missing' and 'coulomb_friction' in named(found)
+    assert found.rmse_after < 0.4 * found.rmse_before
+
+
+CREEP = {
+    # Kelvin and Voigt, which comes to an end, and a power of time, which does not.
+    'kelvin_voigt': lambda time: 3.0 * (1.0 - math.exp(-time / 12.0)),
+    'power': lambda time: 0.75 * time ** 0.35,
+}
+
+
+@pytest.mark.parametrize('form', CREEP)
+def test_creep_by_another_law_is_creep(monkeypatch, form):
+    creep_on = ParallelWires._creep_on
+
+    def otherwise(self, voltage, dt):
+        creep_on(self, voltage, dt)
+        if self._since > 0.0:
+            self._creep *= CREEP[form](self._since) / math.log1p(
+                self._since / self._conditions.creep_time)
+    monkeypatch.setattr(ParallelWires, '_creep_on', otherwise)
+    found = found_in({'creep': 1.0}, 5, trials=(0, 1))
+    assert found.verdict == 'missing' and named(found) & {'creep', 'viscoelastic_creep'}
+    assert found.rmse_after < 0.5 * found.rmse_before
+
+
+@pytest.mark.parametrize('radiated', [0.0, 1.0])
+def test_heat_lost_by_convection_or_radiation_alone_is_heat_loss(monkeypatch, radiated):
+    monkeypatch.setattr(still_air, 'RADIATED', radiated)
+    found = found_in({'heat_loss': 1.0}, 5, trials=(0, 1))
+    assert found.verdict == 'missing' and 'heat_loss' in named(found)
+    assert found.rmse_after < 0.4 * found.rmse_before
+
+
+class Saturating(float):
+    """A shift [K/Pa] that grows less and less with the stress that it is multiplied by."""
+
+    largest = 200e6
+
+    def __mul__(self, stress):
+        return float(self) * self.largest * math.tanh(stress / self.largest)
+
+
+class WideWire(GrainWire):
+    """Loops that widen with the load at first, and less and less."""
+
+    def __init__(self, material):
+        super().__init__(material)
+        self._cooling_shift = Saturating(self._cooling_shift / 1.2)
+
+
+@dataclasses.dataclass(frozen=True)
+class WideMaterial(GrainMaterial):
+    """Grains of such a wire."""
+
+    def wire(self):
+        """Return a new wire, cold."""
+        return WideWire(self)
+
+
+def test_loops_that_widen_by_another_law_are_wide_for_the_same_reason():
+    fields = {field.name: getattr(specimen(5), field.name)
+              for field in dataclasses.fields(specimen(5))}
+    force, length = bench_tables(WideMaterial(**fields), 5)
+    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **TRIALS).model
+    extended, added = add_effects(model, length, force, **TRIALS)
+    names = {effect.id for effect in added}
+    assert 'transformation_slopes' in names and not names & {'r_phase', 'fatigue'}
+    before, after = (one.metrics['length']['verification']['model']['mean_percent']
+                     for one in (model, extended))
+    assert after < 1.0 and after < 0.4 * before
