@@ -1,0 +1,254 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""By how much a model may be wrong beyond what its bench shows, and where."""
+
+import dataclasses
+
+from model_support import arm_run, bicep_model, effect_of, GEOMETRY, runs
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis import discrepancy
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.load_history import load_history
+from hysteresis_ros.diagnosis.settings import Settings
+
+
+@pytest.fixture(scope='module')
+def problem():
+    """Return rows of a model without any error."""
+    model = bicep_model()
+    return problem_for(model, [runs(model)])
+
+
+def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
+    """In the angle it is the error of the length times the arm's sensitivity, and the path's."""
+    gain = discrepancy.sensitivity(problem, [])
+    predicted = problem.simulate([])
+    history = load_history(problem, [])
+    found = discrepancy.discrepancy_along(problem, [], predicted, Settings()).matrix()
+    assert np.diag(found) == pytest.approx(
+        (0.0004 * gain) ** 2 + history.path ** 2 + (gain * history.formation) ** 2)
+    assert found == pytest.approx(found.T)
+    assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
+
+
+def test_the_way_done_counts_only_drives_that_the_response_follows():
+    drive = np.array([0.0, 1.0, 2.0, 4.0, 2.0, 1.0, 0.0])
+    trial = np.zeros(7, dtype=int)
+    flat_to_one = np.array([5.0, 5.0, 8.0, 14.0, 8.0, 5.0, 5.0])
+    found = discrepancy.way_done(drive, flat_to_one, trial)
+    assert found == pytest.approx(np.array([0.0, 0.0, 3.0, 9.0, 3.0, 0.0, 0.0]) / 9.0)
+    # Where it follows everywhere alike, it is the drive itself.
+    even = discrepancy.way_done(drive, -3.0 * drive, trial)
+    assert even == pytest.approx(drive / 4.0)
+    # Both branches of a loop count: here one moves below 2 and one above.
+    loop = discrepancy.way_done(np.array([0.0, 2.0, 4.0, 2.0, 0.0]),
+                                np.array([0.0, 0.0, 6.0, 6.0, 0.0]), np.zeros(5, dtype=int))
+    assert loop == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
+
+
+def test_the_way_of_a_held_drive_lies_beside_it_and_none_between_trials():
+    drive, trial = np.array([0.0, 1.0, 1.0, 2.0, 3.0]), np.zeros(5, dtype=int)
+    late = discrepancy.way_done(drive, np.array([0.0, 0.0, 4.0, 4.0, 4.0]), trial)
+    assert late == pytest.approx([0.0, 0.5, 0.5, 1.0, 1.0])
+    apart = discrepancy.way_done(np.array([0.0, 1.0, 3.0, 4.0]), np.array([0.0, 1.0, 9.0, 10.0]),
+                                 np.array([0, 0, 1, 1]))
+    assert apart == pytest.approx([0.0, 0.5, 0.5, 1.0])
+    still = np.zeros(4, dtype=int)
+    for drive, response in ((np.arange(4.0), np.ones(4)), (np.ones(4), np.arange(4.0))):
+        assert not np.any(discrepancy.way_done(drive, response, still))
+
+
+def test_drives_that_differ_by_rounding_are_one_on_the_way():
+    drive = np.array([0.0, 1.0, 2.0, np.nextafter(2.0, 3.0), 3.0])
+    response, trial = np.array([0.0, 1.0, 3.0, 6.0, 7.0]), np.zeros(5, dtype=int)
+    assert discrepancy.way_done(drive, response, trial) == pytest.approx(
+        discrepancy.way_done(np.round(drive, 3), response, trial))
+
+
+def test_what_martensite_may_keep_of_its_load_is_part_of_the_discrepancy():
+    """As an error of the length, where the strain grows with a load that moves."""
+    model = bicep_model()
+    growth = effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)
+    problem = problem_for(model.with_effects([growth]), [runs(model)])
+    gain, history = discrepancy.sensitivity(problem, [growth]), load_history(problem, [growth])
+    kept = (gain * history.formation) ** 2
+    found = np.diag(discrepancy.discrepancy_along(
+        problem, [growth], problem.simulate([growth]), Settings()).matrix())
+    assert np.mean(kept) > 0.01 * np.mean(found)
+    assert found == pytest.approx((0.0004 * gain) ** 2 + history.path ** 2 + kept)
+
+
+@pytest.mark.parametrize('fitted', [True, False])
+def test_what_may_be_kept_is_no_discrepancy_where_it_is_an_effect(fitted):
+    """In a set, or tried together with it, its own parameter says how much is kept."""
+    model = bicep_model()
+    effects = [effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)]
+    if fitted:
+        effects.append(effect_of(model, 'formation_memory', kept=0.4))
+    problem = problem_for(model.with_effects(effects), [runs(model)])
+    gain, history = discrepancy.sensitivity(problem, effects), load_history(problem, effects)
+    found = discrepancy.discrepancy_along(
+        problem, effects, problem.simulate(effects), Settings(),
+        () if fitted else ('slack', 'formation_memory'))
+    assert np.diag(found.matrix()) == pytest.approx((0.0004 * gain) ** 2 + history.path ** 2)
+
+
+def test_errors_of_rows_that_are_near_on_the_way_and_in_response_are_alike(problem):
+    """More so on the same way of the drive than on the way back."""
+    predicted, settings = problem.simulate([]), Settings()
+    found = discrepancy.discrepancy_along(problem, [], predicted, settings).matrix()
+    size = np.sqrt(np.diag(found))
+    drive, direction = problem.signals['drive'], problem.signals['direction'] > 0.0
+    way = discrepancy.way_done(drive, predicted, problem.trial)
+    gap = np.hypot(way[:, None] - way,
+                   (predicted[:, None] - predicted) / np.ptp(predicted)) / settings.correlation
+    # The part that differs between the directions is half of the common one: 1 - 1/4 to 1 + 1/4.
+    same = np.where(direction[:, None] == direction[None, :], 1.0, 0.6)
+    np.testing.assert_allclose(found / np.outer(size, size), same / np.sqrt(1.0 + gap ** 2),
+                               atol=0.03)
+
+
+def test_the_sensitivity_is_the_slope_of_the_arm(problem):
+    """A longer muscle raises the angle by the inverse of dL/dtheta, less what the load gives."""
+    gain = discrepancy.sensitivity(problem, [])
+    theta = problem.measured
+    step = 1e-5
+    length = problem.model.geometry.length
+    slope = (length(theta + step) - length(theta - step)) / (2.0 * step)
+    assert np.all(gain * slope > 0.0)
+    assert np.median(gain * slope) == pytest.approx(1.0, abs=0.3)
+
+
+def test_the_largest_error_that_the_bench_has_shown_counts():
+    """Of trials and of loads that were left out; else that of the fitted trials, else none."""
+    def error(**length):
+        return discrepancy.length_error(bicep_model(metrics={
+            'length': {part: {'rmse': value} for part, value in length.items()}}))
+    assert error(verification=0.0004) == 0.0004
+    assert error(verification=0.0004, left_out=0.0015) == 0.0015
+    assert error(verification=0.0004, left_out=0.0001) == 0.0004
+    assert error(identification=0.001) == 0.001
+    assert error(identification=0.001, verification=0.0004) == 0.0004
+    assert error(left_out=None, verification=float('nan')) == 0.0
+    assert discrepancy.length_error(bicep_model(metrics={})) == 0.0
+
+
+def by_load(loads, **parts):
+    """Return metrics of a bench with an error [m] under each load [N], of each part."""
+    return {'length': {part: {'rmse': max(errors), 'loads': list(loads), 'rmse_by_load': errors}
+                       for part, errors in parts.items()}}
+
+
+def test_the_error_of_the_length_is_that_under_the_load_of_the_arm():
+    """And of the loads near it; outer ones were extrapolated to, which counts beyond them."""
+    loads, places = (1.0, 3.0, 5.0, 7.0), np.array([-1.0, 1.0, 3.0, 5.0, 7.0, 9.0])
+    asked = np.array([-9.0, -1.0, 1.0, 2.5, 5.0, 9.0, 20.0])
+
+    def error(**parts):
+        return discrepancy.length_errors(bicep_model(metrics=by_load(loads, **parts)), asked)
+    found = error(left_out=[8e-4, 2e-4, 1e-4, 6e-4], identification=[4e-4, 1e-5, 1e-5, 3e-4])
+    squares = 1e-8 * np.array([8.0, 4.0, 2.0, 1.0, 3.0, 6.0]) ** 2
+    for load, one in zip(np.clip(asked, -1.0, 9.0), found):
+        near = np.exp(-0.5 * ((load - places) / 2.0) ** 2)
+        assert one == pytest.approx(np.sqrt(near @ squares / near.sum()))
+    assert found[0] == found[1] > found[2] > found[4] and found[-1] == found[-2]
+    same = error(left_out=4 * [1e-4], identification=4 * [1e-5], verification=4 * [3e-4])
+    assert same == pytest.approx(len(asked) * [3e-4], rel=0.02)
+
+
+@pytest.mark.parametrize('metrics', [
+    by_load((1.0, 7.0), left_out=[8e-4, 2e-4], identification=[1e-5, 1e-5]),
+    {'length': {'left_out': {'rmse': 8e-4}}}])
+def test_two_loads_have_none_between_them_that_could_tell(metrics):
+    found = discrepancy.length_errors(bicep_model(metrics=metrics), np.array([1.0, 4.0, 7.0]))
+    assert found == pytest.approx(3 * [8e-4])
+
+
+def test_the_discrepancy_follows_the_load(problem):
+    """Where the bench was hardly right under a small load, an arm is less certain there."""
+    load = load_history(problem, []).load
+    middle = float(np.median(load))
+    model = dataclasses.replace(problem.model, metrics=by_load(
+        (0.5 * middle, middle, 2.0 * middle), left_out=[9e-4, 1e-4, 1e-4],
+        identification=[9e-4, 1e-5, 1e-4]))
+    problem = problem_for(model, [runs(model)])
+    gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
+    found = np.diag(discrepancy.discrepancy_along(
+        problem, [], problem.simulate([]), Settings()).matrix())
+    error = discrepancy.length_errors(model, load)
+    assert np.ptp(error) > 1e-5
+    assert found == pytest.approx(
+        (error * gain) ** 2 + history.path ** 2 + (gain * history.formation) ** 2)
+
+
+def path_of(model, measured):
+    """Return the difference between a load that moves and one that acted all along."""
+    return load_history(problem_for(model, [measured]), []).path
+
+
+@pytest.mark.parametrize('voltage', [0.0, 2.0, 4.0, 6.0])
+def test_a_load_that_holds_still_leaves_nothing_that_the_bench_cannot_tell(voltage):
+    """An arm at rest is as on the bench: the load that acts has acted all along."""
+    model = bicep_model()
+    measured = arm_run(np.full(20, voltage))
+    assert np.abs(path_of(model, measured)).max() < 1e-6
+
+
+def test_a_load_that_moves_with_the_arm_leaves_a_difference():
+    """Largest in the middle of the transformation, none at its ends, and less for a light arm."""
+    model = bicep_model()
+    both_ways = np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)])
+    path = np.abs(path_of(model, arm_run(both_ways)))
+    assert 1e-3 < path.max() < 0.02
+    assert max(path[0], path[-1]) < 0.1 * path.max()
+    assert path.max() == max(path[5:35])
+    light = bicep_model(geometry=dataclasses.replace(
+        GEOMETRY, payload_mass=1e-4, forearm_mass=1e-4))
+    assert np.abs(path_of(light, arm_run(both_ways))).max() < 0.02 * path.max()
+
+
+@pytest.mark.parametrize('g', [0.4, -0.5])
+def test_loops_that_the_load_widens_are_part_of_both_models(g):
+    """Else the difference would be that of other loops, seven times as large."""
+    model = bicep_model()
+    slopes = effect_of(model, 'transformation_slopes', g=g)
+    both_ways = arm_run(np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)]))
+    plain = np.abs(path_of(model, both_ways)).max()
+    problem = problem_for(model.with_effects([slopes]), [both_ways])
+    assert np.abs(load_history(problem, [slopes]).path).max() == pytest.approx(plain, rel=0.3)
+
+
+def test_cold_ends_are_part_of_both_models():
+    """Else the difference would be that of warm ends, six times as large."""
+    model = bicep_model()
+    ends = effect_of(model, 'cold_clamps', share=0.3)
+    both_ways = arm_run(np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)]))
+    plain = np.abs(path_of(model, both_ways)).max()
+    problem = problem_for(model.with_effects([ends]), [both_ways])
+    assert np.abs(load_history(problem, [ends]).path).max() == pytest.approx(plain, rel=0.3)
+
+
+def test_where_the_strain_does_not_grow_with_the_load_nothing_is_kept():
+    """Nor where the load holds still: the bench shows all that there is."""
+    model = bicep_model()
+    growth = effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)
+    moving = arm_run(np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)]))
+    still = arm_run(np.full(20, 4.0))
+    grown = model.with_effects([growth])
+    assert np.abs(load_history(problem_for(model, [moving]), []).formation).max() < 1e-15
+    kept = np.abs(load_history(problem_for(grown, [moving]), [growth]).formation).max()
+    assert kept > 1e-5
+    assert np.abs(load_history(
+        problem_for(grown, [still]), [growth]).formation).max() < 0.02 * kept
+
+
+def test_what_the_sensor_adds_is_no_way_of_the_arm():
+    """The same arm takes the same way, whatever its encoder says."""
+    model = bicep_model()
+    problem = problem_for(model, [arm_run(np.linspace(0.0, 6.0, 20))])
+    clean = load_history(problem, []).path
+    offset = effect_of(model, 'encoder_offset', offset=5.0)
+    assert np.abs(clean).max() > 1e-3
+    np.testing.assert_array_equal(load_history(problem, [offset]).path, clean)

@@ -1,0 +1,60 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How likely chance explains as much, against its definition."""
+
+from model_support import autoregressive
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis.significance import (
+    autocorrelation, block_sums, cosines, gain_interval, paired_p_values, residualise)
+
+
+@pytest.mark.parametrize('rho', [0.0, 0.5, 0.9])
+def test_autocorrelation_is_that_of_each_trial(rho):
+    noise = autoregressive(np.random.default_rng(1), 40, 200, rho)
+    trial = np.repeat(np.arange(40), 200)
+    assert autocorrelation(noise, trial) == pytest.approx(rho, abs=0.02)
+    assert autocorrelation(-noise, trial) == autocorrelation(noise, trial)
+    # A trial of one row has none before it.
+    assert autocorrelation(noise, np.arange(8000)) == 0.0
+    assert autocorrelation(np.where(np.arange(10) % 2, 1.0, -1.0), np.zeros(10)) == 0.0
+
+
+def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():
+    """The same sum in every block counts, in a single one it does not."""
+    rng = np.random.default_rng(2)
+    steady = 1.0 + 0.3 * rng.standard_normal(24)
+    lucky = np.r_[24.0, np.zeros(23)]
+    values = paired_p_values(np.stack([steady, lucky, -steady]), rng)
+    assert values[0] < 0.02 and values[1] > 0.2 and values[2] > 0.9
+
+
+def test_no_p_value_is_smaller_than_the_draws_can_give():
+    """None of 99 draws was as good: one in a hundred, not none."""
+    gains = np.ones((1, 200)) + 1e-3 * np.arange(200.0)
+    assert paired_p_values(gains, np.random.default_rng(0), 99) == pytest.approx([0.01])
+
+
+def test_the_interval_of_a_gain_holds_its_value():
+    """Half of every residual gone is a gain of exactly one half."""
+    rng = np.random.default_rng(3)
+    before, block = rng.standard_normal(240), np.arange(240) // 10
+    assert gain_interval(before, 0.5 * before, block, rng) == pytest.approx((0.5, 0.5))
+    low, high = gain_interval(before, rng.standard_normal(240), block, rng)
+    assert low < 0.0 < high
+    assert block_sums(np.ones(240), block).tolist() == [10.0] * 24
+
+
+def test_cosines_and_the_residual_of_columns():
+    """Opposite directions are the same signature; projections are orthogonal."""
+    vectors = np.array([[1.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    expected = [[1, 1, 0.5 ** 0.5, 0], [1, 1, 0.5 ** 0.5, 0], [0.5 ** 0.5, 0.5 ** 0.5, 1, 0],
+                [0, 0, 0, 0]]
+    assert cosines(vectors) == pytest.approx(np.array(expected))
+    columns = np.array([[1.0, 2.0], [1.0, 2.0], [0.0, 0.0]])
+    residual = residualise(columns, vectors)
+    assert np.abs(residual @ columns).max() < 1e-12
+    assert residual[2] == pytest.approx([0.0, 0.0, 0.0])
+    assert residual[0] == pytest.approx([0.5, -0.5, 0.0])
+    assert residualise(np.zeros((3, 0)), vectors) is vectors
