@@ -2,23 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """How likely chance explains as much, against its definition."""
 
-from model_support import autoregressive
 import numpy as np
 import pytest
 
 from hysteresis_ros.diagnosis.significance import (
-    autocorrelation, block_sums, cosines, gain_interval, paired_p_values, residualise)
-
-
-@pytest.mark.parametrize('rho', [0.0, 0.5, 0.9])
-def test_autocorrelation_is_that_of_each_trial(rho):
-    noise = autoregressive(np.random.default_rng(1), 40, 200, rho)
-    trial = np.repeat(np.arange(40), 200)
-    assert autocorrelation(noise, trial) == pytest.approx(rho, abs=0.02)
-    assert autocorrelation(-noise, trial) == autocorrelation(noise, trial)
-    # A trial of one row has none before it.
-    assert autocorrelation(noise, np.arange(8000)) == 0.0
-    assert autocorrelation(np.where(np.arange(10) % 2, 1.0, -1.0), np.zeros(10)) == 0.0
+    block_sums, cosines, gain_interval, paired_p_values, residualise)
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():

@@ -91,14 +91,12 @@ class BenchSelection:
         self.sets: list[Fit] = []
         self.tried: list[Fit] = []
         self.p_values: dict[tuple[str, ...], float] = {}
-        self._independent_rows = float(len(np.unique(self.problem.block)))
 
     def run(self) -> None:
         """Fit every effect by itself, grow sets from the best, and compare what they predict."""
         fits = self._begun_where_larger_ended(
             self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
         self.tried = self._judge(fits, self._in_other_forms(fits))
-        self._independent_rows = self._count_independent()
         self.alone = sorted((fit for fit in self.tried if len(fit.effects) == 1), key=self.error)
         values = self._significance(self.tried, self.base)
         self.p_values = {fit.names: float(value) for fit, value in zip(self.tried, values)}
@@ -349,25 +347,11 @@ class BenchSelection:
 
     def _log_odds(self, fit: Fit, base: Fit) -> float:
         """Return the log posterior odds of a fit against another one; see `probabilities`."""
+        count = len(np.unique(self.problem.block))
         prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
         before, after = (max(self.typical_error(one, self.problem.noise), 1e-300)
                          for one in (base, fit))
-        return (prior * (len(fit.effects) - len(base.effects))
-                + self._independent_rows * math.log(before / after))
-
-    def _count_independent(self) -> float:
-        """
-        Return as how many independent rows all rows count, at most one for each block.
-
-        Errors last from row to row, of the model as of a sensor that drifts: of an autoregressive
-        process n rows say what n (1 - rho) / (1 + rho) independent ones would. What lasts is seen
-        where effects have explained most.
-        """
-        best = min([self.base, *self.tried], key=self.typical_error)
-        rho = significance.autocorrelation(
-            self.problem.measured - best.held_out, self.problem.trial)
-        return min(len(np.unique(self.problem.block)),
-                   len(best.held_out) * (1.0 - rho) / (1.0 + rho))
+        return prior * (len(fit.effects) - len(base.effects)) + count * math.log(before / after)
 
     def _gains(self, fit: Fit, base: Fit) -> np.ndarray:
         """
@@ -423,8 +407,8 @@ class BenchSelection:
         """
         Return the tried sets with the probability that their held-out errors give them.
 
-        So many independent rows of unknown variance on each load: the likelihood goes with the
-        typical error to the power of minus that number.
+        As many independent rows as there are blocks, of unknown variance on each load: the
+        likelihood goes with the typical error to the power of minus that number.
         """
         fits = [self.base, *self.sets]
         logs = np.array([self._log_odds(fit, self.base) for fit in fits])

@@ -42,29 +42,6 @@ def paired_p_values(gains: np.ndarray, rng: np.random.Generator, count: int = DR
     return (1.0 + np.sum(best[None, :] >= observed[:, None], axis=1)) / (1.0 + count)
 
 
-def autocorrelation(values: np.ndarray, trial: np.ndarray) -> float:
-    """
-    Return the correlation of values with those before them in their trial, from 0 to 0.99.
-
-    About zero, not about their mean: an offset lasts, too.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-    trial : ndarray of int, shape (n,)
-
-    Returns
-    -------
-    float
-    """
-    products = squares = 0.0
-    for number in np.unique(trial):
-        own = values[trial == number]
-        products += float(own[1:] @ own[:-1])
-        squares += 0.5 * float(own[1:] @ own[1:] + own[:-1] @ own[:-1])
-    return min(max(products / max(squares, 1e-300), 0.0), 0.99)
-
-
 def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
                   rng: np.random.Generator, level: float = 0.95, count: int = DRAWS
                   ) -> tuple[float, float]:
