@@ -8,10 +8,11 @@ import sys
 from typing import NamedTuple
 
 from benchmark.reference import arm_of
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
-from hysteresis_ros.kernels import trial
+from hysteresis_ros.kernels import grid, trial
 from hysteresis_ros.kernels.jit import remember_types
 from hysteresis_ros.kernels.plain import Plain
 from hysteresis_ros.model import Simulator
@@ -89,6 +90,15 @@ def test_the_compiled_arm_is_the_reference_in_plain_python(names, dt):
     expected = [reference.step(value, dt, added, 0.98)
                 for value, added in zip(x.tolist(), offset.tolist())]
     np.testing.assert_allclose(angles, expected, rtol=0.0, atol=exact)
+
+
+@given(st.lists(st.integers(-9, 9), min_size=2, max_size=30), st.floats(-11.0, 11.0),
+       st.integers(-3, 40))
+def test_an_interval_is_found_from_wherever_the_search_begins(values, value, near):
+    """Also where entries are alike, and beyond both ends."""
+    column = np.sort(np.array(values, dtype=float))
+    found = grid.interval(np.column_stack([np.zeros(len(column)), column]), 1, value, near)
+    assert found == min(max(np.searchsorted(column, value, 'right'), 1), len(column) - 1)
 
 
 class Delegate(HysteresisOperator):
