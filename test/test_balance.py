@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The arm's balance against brute force: a search over a fine grid with relays of its own."""
 
+import dataclasses
 import math
 
 from hypothesis import given, settings, strategies as st
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import integrate, optimize
 
-from hysteresis_ros.bicep.balance import ArmBalance
+from hysteresis_ros.bicep.balance import ArmBalance, statics_of
 from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.bicep.wires import COMPLIANCE
 from hysteresis_ros.effects import MaterialEffect
@@ -452,3 +453,12 @@ def test_a_stiff_wire_does_not_cut_time_into_endless_pieces():
     assert light.step(8.0, 0.1) == pytest.approx(balance('viscous_friction', b=0.02).step(8.0, 0.1))
     stiff = MODEL.with_effects([effect_of(MODEL, 'series_compliance', compliance=0.2)])
     assert stiff.chain().compliance() == pytest.approx(0.2e-3)
+
+
+def test_arms_of_one_geometry_share_statics_that_none_of_them_can_change():
+    statics = statics_of(GEOMETRY)
+    assert statics_of(dataclasses.replace(GEOMETRY)) is statics
+    heavier = statics_of(dataclasses.replace(GEOMETRY, payload_mass=GEOMETRY.payload_mass + 0.1))
+    assert np.all(heavier.moment > statics.moment)
+    with pytest.raises(ValueError):
+        statics.moment[0] = 0.0

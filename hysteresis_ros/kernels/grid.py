@@ -4,6 +4,7 @@
 
 import numpy as np
 
+from .clip import clip
 from .lean import lean
 
 # Intervals that are looked at along a straight line before a search by halves takes over.
@@ -41,7 +42,7 @@ def interval(grid: np.ndarray, column: int, value: float, near: int) -> int:
             break
         # Where a straight line through this interval would have the value.
         way = (value - below) / (above - below)
-        k += int(min(max(way, float(low - k)), float(high - k)))
+        k += int(clip(way, float(low - k), float(high - k)))
     while low < high:
         middle = (low + high) // 2
         if value < grid[middle, column]:
