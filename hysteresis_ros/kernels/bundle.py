@@ -123,7 +123,7 @@ def _load_for(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, out
         if value * there < 0.0:
             near, here = far, there
         else:
-            here *= root.kept_share(there, value)
+            here *= root.retained_factor(there, value)
         far, there = point, value
         count += 1
     return far

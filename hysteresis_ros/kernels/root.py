@@ -89,7 +89,7 @@ def proceed(memory: np.ndarray, at: int, value: float) -> float:
         if value * memory[at + _THERE] < 0.0:
             memory[at + _NEAR], memory[at + _HERE] = far, memory[at + _THERE]
         else:
-            memory[at + _HERE] = kept_share(memory[at + _THERE], value) * here
+            memory[at + _HERE] = retained_factor(memory[at + _THERE], value) * here
         memory[at + _FAR], memory[at + _THERE] = memory[at + _STEP], value
         return _next(memory, at)
     memory[at + _THERE] = value
@@ -130,9 +130,11 @@ def outward(near: float, here: float, far: float, there: float, step: float) -> 
 
 
 @lean
-def kept_share(before: float, value: float) -> float:
+def retained_factor(before: float, value: float) -> float:
     """
-    Return what is kept of the value at the other end where two in a row have the same sign.
+    Return the factor on the value at the retained end, after two values of the same sign.
+
+    That of Anderson and Bjorck, but at least a quarter.
 
     Parameters
     ----------
