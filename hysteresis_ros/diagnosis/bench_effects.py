@@ -95,18 +95,45 @@ def _determined(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
                 ) -> tuple[MuscleModel, list[Effect]]:
     """Return the model with the effects found and usual, all of them determined by the rows."""
     excluded: list[str] = []
-    while True:
-        known = _with_universal(
-            model, [effect for effect in found if effect.id not in excluded], fitted, excluded)
-        if not known:
-            return model, []
-        extended, added = extended_model(model, [one.id for one in known], [fitted], known)
-        vague = [effect for effect in added if effect.implausible()
-                 or not_determined(effect, 'bench')]
-        if not vague:
-            return extended, added
+    extended, added = _extended_without(excluded, model, found, fitted)
+    while vague := _vague(added):
         # What every loaded muscle has goes last.
-        excluded.append(min(vague, key=lambda effect: effect.universal).id)
+        name = min(vague, key=lambda effect: effect.universal).id
+        without = _extended_without([*excluded, name], model, found, fitted)
+        rivals = {other: _extended_without([*excluded, other], model, found, fitted)
+                  for other in (effect.id for effect in added) if other != name}
+        # Two effects may stand for each other, so that the size of the one that matters is vague.
+        largest = (1.0 - Settings().practical) * _left_out_rmse(without[0])
+        clear = [other for other, (rival, effects) in rivals.items()
+                 if not _vague(effects) and _left_out_rmse(rival) < largest]
+        if clear:
+            name = min(clear, key=lambda other: _left_out_rmse(rivals[other][0]))
+            without = rivals[name]
+        excluded.append(name)
+        extended, added = without
+    return extended, added
+
+
+def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequence[Effect],
+                      fitted: Measurement) -> tuple[MuscleModel, list[Effect]]:
+    """Return the model with the effects found and usual but for some, and those effects."""
+    known = _with_universal(
+        model, [effect for effect in found if effect.id not in excluded], fitted, excluded)
+    if not known:
+        return model, []
+    return extended_model(model, [one.id for one in known], [fitted], known)
+
+
+def _vague(effects: Sequence[Effect]) -> list[Effect]:
+    """Return those of some effects that the rows of a bench do not determine."""
+    return [effect for effect in effects
+            if effect.implausible() or not_determined(effect, 'bench')]
+
+
+def _left_out_rmse(model: MuscleModel) -> float:
+    """Return the RMSE of trials left out of the fit of H2's weights, infinite if none was."""
+    entry = model.metrics.get('length', {}).get('left_out', {})
+    return float(entry.get('rmse', np.inf))
 
 
 def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measurement,

@@ -289,10 +289,17 @@ class BenchSelection:
         self.found = instead
 
     def _best_without(self, name: str) -> Fit:
-        """Return the best set that lacks an effect, and those that were left out before."""
-        return min((fit for fit in [self.base, *self.sets]
-                    if not {name, *self.unstable}.intersection(fit.names)),
-                   key=self.typical_error)
+        """
+        Return the best set that lacks an effect, and those that were left out before.
+
+        It could be an answer itself: the rows determine all of its effects. Else of two effects
+        that stand for each other neither would be left.
+        """
+        without = [fit for fit in self.sets
+                   if not {name, *self.unstable}.intersection(fit.names)]
+        return next((fit for fit in sorted(without, key=self.typical_error)
+                     if self.typical_error(fit) < self.typical_error(self.base)
+                     and self._determines(fit)), self.base)
 
     def _named_again(self, other: Fit) -> float:
         """Return the share of folds that the set found predicts better than another one."""
