@@ -53,6 +53,11 @@ def test_what_was_left_out_does_not_come_back(selection, monkeypatch):
     vague.append(better[0].names)
     assert selection._best_without('r_phase') is base
     vague.clear()
+    # Nor one that predicts less than nothing at all does.
+    selection.sets = [dataclasses.replace(better[0], held_out=(
+        2.0 * base.held_out - selection.problem.measured))]
+    assert selection._best_without('r_phase') is base
+    selection.sets = better
     selection.unstable['fatigue'] = 'not named again'
     assert selection._best_without('r_phase') is base
     selection.sets, selection.unstable = [], {}

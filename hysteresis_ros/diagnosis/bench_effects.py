@@ -100,8 +100,8 @@ def _determined(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
         # What every loaded muscle has goes last.
         name = min(vague, key=lambda effect: effect.universal).id
         without = _extended_without([*excluded, name], model, found, fitted)
-        rivals = {other: _extended_without([*excluded, other], model, found, fitted)
-                  for other in (effect.id for effect in added) if other != name}
+        rivals = {effect.id: _extended_without([*excluded, effect.id], model, found, fitted)
+                  for effect in added if effect.id != name}
         # Two effects may stand for each other, so that the size of the one that matters is vague.
         largest = (1.0 - Settings().practical) * _left_out_rmse(without[0])
         clear = [other for other, (rival, effects) in rivals.items()
