@@ -12,6 +12,7 @@ from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Air, Conditions
 from hysteresis_ros.laboratory.linkage import Linkage
+from hysteresis_ros.laboratory.plant import MUSCLES, specimen
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import simulation, Simulator
 from model_support import arm_run, bicep_model, effect_of, GEOMETRY, runs, wandering_voltage
@@ -163,6 +164,21 @@ def test_the_laboratorys_wires_stay_longer_after_the_largest_load():
         one.heat_and_cool()
         one.settle(30.0, 3.0)
     assert linkage.elongation(arm.angle) - linkage.elongation(plain.angle) > 0.5 * shifts[1]
+
+
+@pytest.mark.parametrize('muscle', MUSCLES)
+def test_the_laboratorys_wires_have_not_yielded_before_a_recording(muscle):
+    """However a wire is brought to the cold state in which a recording begins."""
+    plain, arm = (Arm(Conditions(material=specimen(1, muscle), air=Air(turbulence=0.0),
+                                 yield_tension=tension, yield_compliance=0.004))
+                  for tension in (math.inf, 5.8))
+    shifts = []
+    for voltage in (1.0, 6.0, 1.0):
+        for one in (plain, arm):
+            one.settle(30.0, voltage)
+        shifts.append(arm.angle - plain.angle)
+    assert shifts[0] == pytest.approx(0.0, abs=1e-4)
+    assert shifts[2] > 0.01
 
 
 @pytest.mark.slow

@@ -67,10 +67,10 @@ class ParallelWires:
         balance : callable
             Brings the wires to rest at a temperature.
         """
-        cycles = self.cycles
+        cycles, largest = self.cycles, self._largest
         for temperature in temperatures:
             balance(temperature)
-        self.cycles = cycles
+        self.cycles, self._largest = cycles, largest
         self._begin()
 
     def _begin(self) -> None:
