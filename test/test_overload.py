@@ -167,11 +167,13 @@ def test_the_laboratorys_wires_stay_longer_after_the_largest_load():
 
 
 @pytest.mark.parametrize('muscle', MUSCLES)
-def test_the_laboratorys_wires_have_not_yielded_before_a_recording(muscle):
+def test_the_laboratorys_preparation_of_a_recording_is_no_use(muscle):
     """However a wire is brought to the cold state in which a recording begins."""
     plain, arm = (Arm(Conditions(material=specimen(1, muscle), air=Air(turbulence=0.0),
                                  yield_tension=tension, yield_compliance=0.004))
                   for tension in (math.inf, 5.8))
+    # Where it comes to hang under the arm's load a wire may transform a little.
+    assert arm.muscle.cycles < 0.01
     shifts = []
     for voltage in (1.0, 6.0, 1.0):
         for one in (plain, arm):

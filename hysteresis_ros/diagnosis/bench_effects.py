@@ -104,8 +104,7 @@ def _determined(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
                   for effect in added if effect.id != name}
         # Two effects may stand for each other, so that the size of the one that matters is vague.
         largest = (1.0 - Settings().practical) * _left_out_rmse(without[0])
-        clear = [other for other, (rival, effects) in rivals.items()
-                 if not _vague(effects) and _left_out_rmse(rival) < largest]
+        clear = [other for other, (rival, _) in rivals.items() if _left_out_rmse(rival) < largest]
         if clear:
             name = min(clear, key=lambda other: _left_out_rmse(rivals[other][0]))
             without = rivals[name]
@@ -187,8 +186,7 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
         error, effects = tried([*found, *more])
         if error > largest:
             continue
-        lost = [one.id for one in effects if not one.universal
-                and (one.implausible() or not_determined(one, 'bench'))]
+        lost = [one.id for one in _vague(effects) if not one.universal]
         # What only explained the residual of another effect leaves its range once that is there.
         return _with_universal(model, [one for one in found if one.id not in lost], fitted,
                                excluded) if lost else effects
