@@ -40,8 +40,8 @@ def selection():
 
 def test_what_was_left_out_does_not_come_back(selection, monkeypatch):
     """Two sets that each lack an effect of the other could take turns without an end."""
-    vague = []
-    monkeypatch.setattr(selection, '_determines', lambda fit: fit.names not in vague)
+    undetermined = []
+    monkeypatch.setattr(selection, '_determines', lambda fit: fit.names not in undetermined)
     base = selection.base
     selection.sets = [dataclasses.replace(base, effects=[catalogue()[name]() for name in names])
                       for names in (('slack', 'fatigue'), ('slack', 'r_phase'))]
@@ -50,9 +50,9 @@ def test_what_was_left_out_does_not_come_back(selection, monkeypatch):
     selection.sets = better
     assert selection._best_without('r_phase') is better[0]
     # Nor is a set an answer whose sizes the rows do not determine.
-    vague.append(better[0].names)
+    undetermined.append(better[0].names)
     assert selection._best_without('r_phase') is base
-    vague.clear()
+    undetermined.clear()
     # Nor one that predicts less than nothing at all does.
     selection.sets = [dataclasses.replace(better[0], held_out=(
         2.0 * base.held_out - selection.problem.measured))]
@@ -104,7 +104,7 @@ def test_two_effects_that_stand_for_each_other_are_not_both_left_out(seed):
     """
     A softer martensite and a strain that grows with the load fit this wire alike.
 
-    Both would go, were the one not named again because of the other, and that one's size vague.
+    Both would go, were the one not named again because of the other, whose size is not determined.
     """
     model, length = bench_of('tanaka', seed)
     extended, added = add_effects(model, length)
@@ -113,7 +113,7 @@ def test_two_effects_that_stand_for_each_other_are_not_both_left_out(seed):
     assert 'stress_dependent_strain' not in names
 
 
-def test_what_makes_the_growth_with_the_load_vague_goes_instead_of_the_growth(monkeypatch):
+def test_what_makes_the_growth_with_the_load_undetermined_goes_instead_of_the_growth(monkeypatch):
     """Without the growth the left-out loads are missed three times as far."""
     squares = np.square(sequences.damped_oscillation())
     places = np.arange(len(squares))

@@ -96,13 +96,13 @@ def _determined(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
     """Return the model with the effects found and usual, all of them determined by the rows."""
     excluded: list[str] = []
     extended, added = _extended_without(excluded, model, found, fitted)
-    while vague := _vague(added):
+    while undetermined := _undetermined(added):
         # What every loaded muscle has goes last.
-        name = min(vague, key=lambda effect: effect.universal).id
+        name = min(undetermined, key=lambda effect: effect.universal).id
         without = _extended_without([*excluded, name], model, found, fitted)
         rivals = {effect.id: _extended_without([*excluded, effect.id], model, found, fitted)
                   for effect in added if effect.id != name}
-        # Two effects may stand for each other, so that the size of the one that matters is vague.
+        # Two effects may stand for each other, so that of neither the size is determined.
         largest = (1.0 - Settings().practical) * _left_out_rmse(without[0])
         clear = [other for other, (rival, _) in rivals.items() if _left_out_rmse(rival) < largest]
         if clear:
@@ -123,7 +123,7 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     return extended_model(model, [one.id for one in known], [fitted], known)
 
 
-def _vague(effects: Sequence[Effect]) -> list[Effect]:
+def _undetermined(effects: Sequence[Effect]) -> list[Effect]:
     """Return those of some effects that the rows of a bench do not determine."""
     return [effect for effect in effects
             if effect.implausible() or not_determined(effect, 'bench')]
@@ -157,7 +157,7 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
     def held_out(fit: Fit) -> float:
         return fitter.error(fitter.cross_validate(fit).held_out)
 
-    def vague(effects: Sequence[Effect]) -> list[Effect]:
+    def usual_undetermined(effects: Sequence[Effect]) -> list[Effect]:
         return [one for one in effects if one.universal and not_determined(one, 'bench')]
 
     # Alone they have to help; together with one that was found they only must not harm.
@@ -167,11 +167,11 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
     def tried(effects: Sequence[Effect]) -> tuple[float, list[Effect]]:
         fit = fitter.fit(effects)
         fitted_effects = fitter.with_intervals(fit)
-        new = [one.id for one in vague(fitted_effects) if one.id not in names]
+        new = [one.id for one in usual_undetermined(fitted_effects) if one.id not in names]
         # Where no effect explains the load, held-out loads would tell of what is missing.
         if fit.implausible() or len(new) > (1 if found else 0):
             return np.inf, fitted_effects
-        if not vague(fitted_effects):
+        if not usual_undetermined(fitted_effects):
             error = held_out(fit)
             # Fitted anew without a load, one more parameter may predict that load worse.
             if error <= largest:
@@ -180,13 +180,13 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
         error, located_effects = located(
             fitter, [one for one in fit.effects if one is not last], last) or (np.inf, [])
         # What was found is not to be given up for what could stand for it.
-        return (np.inf if vague(located_effects) else error), located_effects
+        return (np.inf if usual_undetermined(located_effects) else error), located_effects
 
     for more in (rest, *([effect] for effect in rest)):
         error, effects = tried([*found, *more])
         if error > largest:
             continue
-        lost = [one.id for one in _vague(effects) if not one.universal]
+        lost = [one.id for one in _undetermined(effects) if not one.universal]
         # What only explained the residual of another effect leaves its range once that is there.
         return _with_universal(model, [one for one in found if one.id not in lost], fitted,
                                excluded) if lost else effects
