@@ -241,6 +241,21 @@ def test_motion_is_that_of_the_equation_of_motion(
     assert np.max(np.abs(seen - true(time)[0])) < tolerance * stroke
 
 
+@pytest.mark.parametrize('jitter', [1e-14, 0.2])
+def test_a_clock_that_is_not_quite_even_costs_no_accuracy(jitter):
+    """Times of a file are decimal: no two of their differences are the same number."""
+    start = reversible_balance(viscous_friction={'b': 0.5}).settle(4.0)
+    true = free_arm(6.0, 0.6, 0.5, 0.0, start)
+    errors = []
+    for share in (0.0, jitter):
+        made = reversible_balance(viscous_friction={'b': 0.5})
+        made.settle(4.0)
+        dt = 0.02 * (1.0 + share * np.tile([1.0, -1.0], 12))
+        seen = np.array([made.step(6.0, one) for one in dt])
+        errors.append(np.sqrt(np.mean((seen - true(np.cumsum(dt))[0])[4:] ** 2)))
+    assert errors[1] == pytest.approx(errors[0], rel=0.5)
+
+
 @pytest.mark.parametrize('inertia, viscous', [(0.003, 0.002), (0.03, 0.02)])
 def test_many_swings_keep_their_phase_and_size_at_ten_samples_a_second(inertia, viscous):
     made = reversible_balance(inertia={'I': inertia, 'b': viscous},

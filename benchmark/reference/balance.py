@@ -243,11 +243,13 @@ class ArmBalance:
             way = theta - self._angle - dt * self._velocity
             acceleration = 12.0 * way / dt ** 2 - 5.0 * self._acceleration
             return self._velocity + 0.5 * dt * (self._acceleration + acceleration), acceleration
-        if self._before is not None and self._before[0] == dt:
-            # Two steps alike: of second order.
-            _, angle, velocity = self._before
-            speed = (1.5 * theta - 2.0 * self._angle + 0.5 * angle) / dt
-            return speed, (1.5 * speed - 2.0 * self._velocity + 0.5 * velocity) / dt
+        if self._before is not None and dt < 2.414 * self._before[0]:
+            before, angle, velocity = self._before
+            # Derivative of the parabola through three points at its end.
+            r = dt / before
+            here, last = (1.0 + 2.0 * r) / (1.0 + r), r * r / (1.0 + r)
+            speed = (here * theta - (1.0 + r) * self._angle + last * angle) / dt
+            return speed, (here * speed - (1.0 + r) * self._velocity + last * velocity) / dt
         speed = (theta - self._angle) / dt
         return speed, (speed - self._velocity) / dt
 

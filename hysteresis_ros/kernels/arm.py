@@ -38,6 +38,10 @@ REST_SEARCH = NEAR + 5
 BUNDLE_SEARCH = REST_SEARCH + root.SIZE
 MOTION = BUNDLE_SEARCH + SEARCH
 
+# Up to this ratio of a dt to the one before backward differences of second order are stable
+# (Grigorieff, Numer. Math. 42 (1983) 359): 1 + sqrt(2). Beyond, those of first order are taken.
+LARGEST_RATIO = 2.414
+
 # Load that may be missing while the arm moves, over that at rest.
 LOOSER = 1e4
 
@@ -147,16 +151,22 @@ def present(arm: Arm, motion: np.ndarray) -> tuple[int, float]:
 
 @lean
 def moved(motion: np.ndarray, theta: float, dt: float) -> tuple[float, float]:
-    """Return velocity and acceleration where the arm gets to `theta` within `dt`."""
+    """
+    Return velocity and acceleration where the arm gets to `theta` within `dt`.
+
+    By backward differences of second order for any dt, as those of a clock are never quite alike.
+    """
     angle, velocity = motion[ANGLE], motion[VELOCITY]
     if motion[RINGING] != 0.0:
         way = theta - angle - dt * velocity
         acceleration = 12.0 * way / dt ** 2 - 5.0 * motion[ACCELERATION]
         return velocity + 0.5 * dt * (motion[ACCELERATION] + acceleration), acceleration
-    if motion[BEFORE_DT] == dt:
-        # Twice the same dt: of second order.
-        speed = (1.5 * theta - 2.0 * angle + 0.5 * motion[BEFORE_ANGLE]) / dt
-        return speed, (1.5 * speed - 2.0 * velocity + 0.5 * motion[BEFORE_VELOCITY]) / dt
+    ratio = dt / motion[BEFORE_DT]
+    if ratio < LARGEST_RATIO:
+        here, last = (1.0 + 2.0 * ratio) / (1.0 + ratio), ratio * ratio / (1.0 + ratio)
+        speed = (here * theta - (1.0 + ratio) * angle + last * motion[BEFORE_ANGLE]) / dt
+        return speed, (here * speed - (1.0 + ratio) * velocity
+                       + last * motion[BEFORE_VELOCITY]) / dt
     speed = (theta - angle) / dt
     return speed, (speed - velocity) / dt
 

@@ -4,8 +4,8 @@
 The arm from sample to sample, and over a whole trial.
 
 Dry friction lets the load lie in a band, inside which the arm sticks; viscous friction and inertia
-add what the present velocity and acceleration cost: by backward differences, of second order over
-an equal dt, and while the arm rings by the method of Fox and Goodwin, Newmark's with beta = 1/12,
+add what the present velocity and acceleration cost: by backward differences of second order, and
+while the arm rings by the method of Fox and Goodwin, Newmark's with beta = 1/12,
 whose phase is of fourth order.
 """
 
