@@ -115,6 +115,8 @@ def test_deactivated_bridge_is_off_until_it_is_enabled(bridge, graph):
     board = one.node._board
     assert one.change(Transition.TRANSITION_DEACTIVATE) and one.state == INACTIVE
     assert not board.status.sample.enabled and board.status.sample.voltage == 0.0
+    # What was published before may still be on its way.
+    graph.spin(0.3)
     del voltages[:]
     setpoints.publish(Float64(data=3.0))
     graph.spin(0.3)
