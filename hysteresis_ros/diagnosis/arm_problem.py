@@ -9,6 +9,7 @@ Refitted weights would absorb most of what an effect does.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import dataclasses
 import os
 from typing import Literal, TYPE_CHECKING
 
@@ -18,6 +19,7 @@ from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.diagnosis.discrepancy import Offset
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.identification.operators import preisach_rows
+from hysteresis_ros.model.simulation import Simulator
 from hysteresis_ros.operators import Preisach
 
 if TYPE_CHECKING:
@@ -37,6 +39,10 @@ class ArmProblem(Problem):
     def __init__(self, model: MuscleModel, measurements: Sequence[Measurement]) -> None:
         super().__init__(model, measurements)
         self._known: dict[tuple, np.ndarray] = {}
+        self._replicated = [
+            [Simulator(dataclasses.replace(model, length_stage=one.length_stage), *pair,
+                       model.effects) for pair in zip(measurements, self.chosen)]
+            for one in model.replicates]
 
     def simulate(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> np.ndarray:
         """
@@ -83,6 +89,24 @@ class ArmProblem(Problem):
         runs = [simulator.run_many(sets, jobs)[:, rows]
                 for simulator, rows in zip(self.simulators, self.chosen)]
         return np.concatenate(runs, axis=1)
+
+    def simulate_replicates(self, effects: Sequence[Effect]) -> np.ndarray:
+        """
+        Return the response of the judged rows as the model's replicates simulate it.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+
+        Returns
+        -------
+        ndarray, shape (R, n)
+        """
+        responses = [self.pick([simulator.run(replicate.instead_of(self.model.effects, effects))
+                                for simulator in simulators])
+                     for replicate, simulators in zip(self.model.replicates, self._replicated)]
+        return np.array(responses).reshape(len(responses), len(self.measured))
 
     def completed(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return the model with these effects."""

@@ -18,6 +18,7 @@ from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.errors import IdentificationError
@@ -84,6 +85,8 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
         extended, added = extended_model(model, names, [fitted])
     else:
         return model, []
+    if added:
+        extended = with_replicates(extended, BenchProblem(model, [fitted]))
     metrics = measure(extended, force, force_trials, length, length_trials)
     # The errors of loads left out of the last fit of the weights stay with the new ones.
     for name, entry in metrics.items():

@@ -213,10 +213,21 @@ class BenchProblem(Problem):
     @functools.cached_property
     def loads_return(self) -> bool:
         """Whether a load comes back after another one, so that use can be told from load."""
-        loads = np.array([np.mean(trial.load) for trial in self._trials])
-        loads = np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
+        loads = self._load_of_trial
         kinds = len(np.unique(loads))
         return kinds == 1 or 1 + np.count_nonzero(np.diff(loads)) > kinds
+
+    @property
+    def left_out_together(self) -> np.ndarray:
+        """Groups of rows, shape (n,), by the load, or by the trial where all loads are the same."""
+        loads = self._load_of_trial
+        return loads[self.trial] if len(np.unique(loads)) > 1 else self.trial
+
+    @functools.cached_property
+    def _load_of_trial(self) -> np.ndarray:
+        """Which load each trial has, shape (trials,); those that count as the same are equal."""
+        loads = np.array([np.mean(trial.load) for trial in self._trials])
+        return np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
 
     def _design(self, effects: Sequence[Effect], levels: int | None = None,
                 train: np.ndarray | None = None, phases: list[np.ndarray] | None = None,
@@ -311,9 +322,10 @@ class BenchProblem(Problem):
             found.append(model.martensite(stage.simulate(part[1:])))
         return found
 
-    def fit_stage(self, effects: Sequence[Effect], levels: int) -> tuple[WeightFit, Design]:
+    def fit_stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray | None = None
+                  ) -> tuple[WeightFit, Design]:
         """
-        Fit H2's weights to all rows, their regularisation cross-validated over the trials.
+        Fit H2's weights, their regularisation cross-validated over the trials.
 
         Parameters
         ----------
@@ -321,19 +333,24 @@ class BenchProblem(Problem):
             All effects of the model.
         levels : int
             Of H2.
+        train : ndarray of bool, shape (n,), optional
+            Rows to fit; all by default.
 
         Returns
         -------
         WeightFit, Design
         """
-        groups = self.trial if len(np.unique(self.trial)) > 1 else self.block
+        rows = slice(None) if train is None else train
+        groups = self.trial[rows]
+        if len(np.unique(groups)) == 1:
+            groups = self.block[rows]
         phases, passes = None, 0
         if any(effect.needs_phase for effect in effects):
-            phases, passes = self._phases(effects, None), PHASE_PASSES
+            phases, passes = self._phases(effects, train), PHASE_PASSES
         for remaining in range(passes, -1, -1):
             design = self._design(effects, levels, phases=phases)
             fit = fit_weights(
-                design.rows, self.measured - design.known, groups=groups,
+                design.rows[rows], (self.measured - design.known)[rows], groups=groups,
                 scale=_scale(design.nodes), slack=SLACK,
                 penalty=smoothness(design.nodes, reversible=True))
             if remaining:
@@ -341,6 +358,11 @@ class BenchProblem(Problem):
                 phases = self._phases_with(
                     effects, _stage(design.nodes, fit.weights, fit.bias), phases)
         return fit, design
+
+    def stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray) -> Preisach:
+        """Return H2 as rows to train on (n,) give it, with all effects of the model."""
+        fit, design = self.fit_stage(effects, levels, train)
+        return _stage(design.nodes, fit.weights, fit.bias)
 
     def simulate(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> np.ndarray:
         """Return the response of the judged rows, shape (n,), weights fitted to `train` (n,)."""
@@ -441,7 +463,7 @@ class BenchProblem(Problem):
         metrics['length'] = {**metrics.get('length', {}), **left_out(
             fit, self.trial, self.signals.get('load'))}
         return dataclasses.replace(
-            self.model, effects=list(effects), length_stage=stage, metrics=metrics)
+            self.model, effects=list(effects), length_stage=stage, metrics=metrics, replicates=[])
 
 
 @functools.lru_cache(maxsize=4)

@@ -6,7 +6,9 @@ Discrepancy of the base model: how wrong it is by itself, as a covariance of an 
 It is known before the arm moves. The bench says how large the error of the length is under each
 load, on trials or loads that were held out; on the arm it shows as an error of the angle that is
 alike at neighbouring responses and at drives between which the response does little, and differs
-between the directions of the drive. And the bench holds the load still, while an arm's load moves
+between the directions of the drive. What no load of the bench has shown may be off everywhere at
+once, as where the load's influence is: a load that the bench lacks would change the model about as
+much as one that it has does when it is left out. And the bench holds the load still, while an arm's load moves
 with the wire: what a load does in the middle of a transformation the bench cannot tell. Models that
 agree on every bench table bound that (`load_history`); but where one of them is an effect that is
 tried, it speaks for itself.
@@ -56,21 +58,26 @@ class Discrepancy:
         Standard deviations of independent errors in each row, in the unit of the response.
     places : ndarray, shape (n, m)
         Where each row lies, in units of the length over which errors change.
+    common : ndarray, shape (n, q)
+        Errors of which each acts in all rows together, by one standard deviation.
     """
 
     parts: np.ndarray
     places: np.ndarray
+    common: np.ndarray
 
     @property
     def size(self) -> float:
         """Root mean square, in the unit of the response."""
-        return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1))))
+        return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1)
+                                     + np.sum(self.common ** 2, axis=1))))
 
     def matrix(self) -> np.ndarray:
         """Return the covariance, shape (n, n)."""
         squares = np.sum(self.places ** 2, axis=1)
         gaps = squares[:, None] + squares[None, :] - 2.0 * self.places @ self.places.T
-        return (self.parts @ self.parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0))
+        return (self.common @ self.common.T
+                + (self.parts @ self.parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0)))
 
 
 class Offset(MaterialEffect):
@@ -185,7 +192,29 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     return Discrepancy(
         np.column_stack([bench, DIRECTIONAL * direction * bench, history.path, formation]),
         np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])
-        / settings.correlation)
+        / settings.correlation, left_out_changes(problem, effects))
+
+
+def left_out_changes(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+    """
+    Return what the response would change by without each of the bench's loads.
+
+    Divided by the root of their number, so that the sum of their squares is the mean square.
+
+    Parameters
+    ----------
+    problem : ArmProblem
+        Rows and model.
+    effects : sequence of Effect
+        All effects of the model.
+
+    Returns
+    -------
+    ndarray, shape (n, R)
+    """
+    responses = problem.simulate_replicates(effects)
+    own, = problem.simulate_many([effects])
+    return ((responses - own) / math.sqrt(max(len(responses), 1))).T
 
 
 def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import can_be_located
 from hysteresis_ros.diagnosis.observable import may_differ, observable, present, unaffected
 from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import Effect, effect_class
@@ -219,6 +220,8 @@ def _gained(model: MuscleModel, problem: ArmProblem | BenchProblem,
             [*unaffected(problem.model.effects, effects), *effects])))
     added = stages[-1][1]
     extended = _stamped(models[-1][1], added, train, problem.kind, by_hand)
+    if problem.refits:
+        extended = with_replicates(extended, problem)
     models[-1] = (models[-1][0], extended)
     steps = [(name, rmse(one, judged, model.effects)) for name, one in models]
     # Where weights are refitted, the fair base is one that was refitted to the same rows.

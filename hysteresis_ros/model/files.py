@@ -18,6 +18,7 @@ from hysteresis_ros.effects import (
 from hysteresis_ros.errors import HysteresisError, ModelFileError
 from hysteresis_ros.model.linear import LinearModel
 from hysteresis_ros.model.muscle import MuscleModel
+from hysteresis_ros.model.replicates import Replicate
 from hysteresis_ros.operators import HysteresisOperator, operator_from_dict
 
 SCHEMA = 1
@@ -41,6 +42,9 @@ def to_dict(model: MuscleModel) -> dict[str, Any]:
         'linear': model.linear.to_dict() if model.linear else None,
         'force_stage': model.force_stage.to_dict() if model.force_stage else None,
         'length_stage': model.length_stage.to_dict() if model.length_stage else None,
+        'replicates': [{
+            'effects': [_effect_entry(effect) for effect in replicate.effects],
+            'length_stage': replicate.length_stage.to_dict()} for replicate in model.replicates],
         'provenance': model.provenance,
     })
 
@@ -158,8 +162,16 @@ def from_dict(content: Mapping[str, Any]) -> MuscleModel:
                   if content['geometry'] else None),
         ranges=ranges, mean_load=_number(content['mean_load'], 'mean_load'),
         metrics=dict(content['metrics']), provenance=dict(content['provenance']))
-    model.effects = [_effect(entry, model.surroundings) for entry in content['effects']]
+    model.effects = _effects(content, model)
+    # Files of before have none.
+    model.replicates = [
+        Replicate(operator_from_dict(entry['length_stage']), _effects(entry, model))
+        for entry in content.get('replicates', [])]
     return model
+
+
+def _effects(content: Mapping[str, Any], model: MuscleModel) -> list[Effect]:
+    return [_effect(entry, model.surroundings) for entry in content['effects']]
 
 
 def _operator(content: Mapping[str, Any] | None) -> HysteresisOperator | None:

@@ -25,6 +25,7 @@ from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.linear import LinearModel
 from hysteresis_ros.model.places import stage_of_places
+from hysteresis_ros.model.replicates import Replicate
 from hysteresis_ros.operators import HysteresisOperator
 
 if TYPE_CHECKING:
@@ -66,6 +67,8 @@ class MuscleModel:
         What was seen of drive, load and response.
     mean_load : float
         Mean load of the bench's length table.
+    replicates : list of Replicate
+        H2 and effects as identified without one of the bench's loads each.
     metrics, provenance : dict
         Errors of the identification (of lengths also `rmse_by_load` [m] at `loads` [N]), and where
         the model came from.
@@ -83,6 +86,7 @@ class MuscleModel:
     geometry: BicepGeometry | None = None
     ranges: dict[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     mean_load: float = 0.0
+    replicates: list[Replicate] = dataclasses.field(default_factory=list)
     metrics: dict[str, Any] = dataclasses.field(default_factory=dict)
     provenance: dict[str, Any] = dataclasses.field(default_factory=dict)
 

@@ -1,0 +1,50 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Identify a bench model again without each of the bench's loads: its jackknife replicates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.bench_fit import MOST_EVALUATIONS, Response, TOLERANCE
+from hysteresis_ros.diagnosis.bench_problem import BenchProblem
+from hysteresis_ros.identification.least_squares import folds_of
+from hysteresis_ros.model.replicates import Replicate
+from hysteresis_ros.operators import Preisach
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model import MuscleModel
+
+
+def with_replicates(model: MuscleModel, problem: BenchProblem) -> MuscleModel:
+    """
+    Return a model with H2 and effects as the bench gives them without each of its loads.
+
+    Where all loads are the same, without each trial; of a single trial, without parts of it.
+
+    Parameters
+    ----------
+    model : MuscleModel
+        As identified, with effects or without.
+    problem : BenchProblem
+        Of the rows that it was identified from.
+
+    Returns
+    -------
+    MuscleModel
+    """
+    return dataclasses.replace(model, replicates=list(_replicates(model, problem)))
+
+
+def _replicates(model: MuscleModel, problem: BenchProblem) -> Iterator[Replicate]:
+    stage, finer = model.length_stage, problem.finer()
+    assert isinstance(stage, Preisach)      # no other one has effects on a bench
+    for left_out in folds_of(problem.left_out_together):
+        response = Response(finer, [], model.effects, ~left_out)
+        effects = response.parameters.with_vector(response.minimise(
+            response.parameters.vector(), MOST_EVALUATIONS, TOLERANCE))
+        yield Replicate(problem.stage(effects, len(stage.nodes) - 1, ~left_out), effects)
