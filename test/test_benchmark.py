@@ -4,10 +4,11 @@
 
 import json
 import math
+import os
 import subprocess
 import sys
 
-from benchmark.__main__ import discover, main, merge
+from benchmark.__main__ import discover, in_own_process, main, merge
 import pytest
 
 from hysteresis_ros.errors import HysteresisError
@@ -41,6 +42,29 @@ def test_every_module_offers_a_benchmark():
     assert all(function.__name__.endswith('_benchmarks') for function in functions)
 
 
+def here(function, quick):
+    """Measure in this process."""
+    return function(quick)
+
+
+def test_a_benchmark_has_a_process_of_its_own(tmp_path, monkeypatch, capfd):
+    """With nothing imported but what it needs; one that fails is named."""
+    (tmp_path / 'measured.py').write_text(
+        'import sys\n'
+        'def sizes_benchmarks(quick):\n'
+        '    print("on the way")\n'
+        '    return {"quick": float(quick), "rclpy": float("rclpy" in sys.modules)}\n'
+        'def broken_benchmarks(quick):\n'
+        '    raise ValueError("it broke")\n')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path), prepend=os.pathsep)
+    monkeypatch.syspath_prepend(tmp_path)
+    import measured
+    assert in_own_process(measured.sizes_benchmarks, True) == {'quick': 1.0, 'rclpy': 0.0}
+    with pytest.raises(HysteresisError, match=r'measured\.broken_benchmarks ended with 1'):
+        in_own_process(measured.broken_benchmarks, False)
+    assert 'it broke' in capfd.readouterr().err
+
+
 @pytest.mark.slow
 def test_every_benchmark_runs(root, tmp_path):
     """The quick form measures the same names, but for those of the long diagnoses."""
@@ -60,6 +84,9 @@ def test_every_benchmark_runs(root, tmp_path):
                  'endurance_node_heated_ratio', 'endurance_node_published_count',
                  'monitor_share_of_core_ratio', 'monitor_samples_per_s'):
         assert content[name] > 0.0, name
+    # What a root may be off [rad]: its tolerance at rest, and what it adds up to in motion.
+    for name, largest in (('settled', 1e-8), ('viscous', 1e-5), ('inertia', 1e-5)):
+        assert content[f'arm_{name}_difference_from_reference_rad'] < largest, name
     for name in ('endurance_lost_in_the_bag_count', 'endurance_missed_watchdogs_count',
                  'endurance_node_lost_in_the_bag_count', 'endurance_node_setpoints_lost_count',
                  'endurance_node_missed_watchdogs_count'):
@@ -69,7 +96,7 @@ def test_every_benchmark_runs(root, tmp_path):
 def test_the_file_holds_one_flat_mapping(monkeypatch, tmp_path, capsys):
     """Names to numbers, and the same on the terminal."""
     monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda _: {'a_us': 2, 'b': 0.5}])
-    assert main(str(tmp_path / 'benchmark.json')) == 0
+    assert main(str(tmp_path / 'benchmark.json'), measure=here) == 0
     content = json.loads((tmp_path / 'benchmark.json').read_text(encoding='utf-8'))
     assert content == {'a_us': 2.0, 'b': 0.5}
     assert 'a_us' in capsys.readouterr().out
@@ -78,6 +105,6 @@ def test_the_file_holds_one_flat_mapping(monkeypatch, tmp_path, capsys):
 def test_a_failing_benchmark_is_told_in_one_line(monkeypatch, tmp_path, capsys):
     """No file is written, and the exit status says so."""
     monkeypatch.setattr('benchmark.__main__.discover', lambda: [lambda _: {'a': math.nan}])
-    assert main(str(tmp_path / 'benchmark.json')) == 1
+    assert main(str(tmp_path / 'benchmark.json'), measure=here) == 1
     assert not (tmp_path / 'benchmark.json').exists()
     assert capsys.readouterr().err.count('\n') == 1
