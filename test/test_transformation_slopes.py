@@ -15,6 +15,7 @@ from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.laboratory import sequences
 from hysteresis_ros.laboratory.bench import Bench
 from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.experiments import experiment_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import specimen
 from hysteresis_ros.measurements import Measurement
@@ -147,6 +148,22 @@ def test_slopes_that_differ_are_named_on_the_bench_and_no_r_phase():
     before, after = (one.metrics['length']['verification']['model']['mean_percent']
                      for one in (model, extended))
     assert after < 0.5 and after < 0.3 * before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('seed', [7403, 7406])
+def test_where_loads_left_out_tell_little_the_rows_fitted_decide(seed):
+    """Where C follows the strain instead, loads left out are predicted as well."""
+    tables = experiment_tables('bench', {}, seed, 'lagoudas')
+    force, length = (Measurement.from_columns(tables[name]) for name in
+                     ('force.csv', 'length.csv'))
+    trials = {'length_trials': range(4), 'force_trials': [0]}
+    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
+    _, added = add_effects(model, length, force, **trials)
+    found = {effect.id: effect for effect in added}
+    assert set(found) == {'stress_dependence', 'stress_dependent_strain', 'series_compliance',
+                          'transformation_slopes'}
+    assert found['stress_dependence'].follows < 0.5
 
 
 def test_it_makes_no_sense_without_a_load_or_for_a_muscle_that_extends():

@@ -108,8 +108,8 @@ class BenchSelection:
         best = min(map(self.typical_error, self.sets))
         near_best = [fit for fit in self.sets
                      if self.typical_error(fit) <= (1.0 + self.settings.practical) * best]
-        self.found = min(near_best, key=lambda fit: (
-            len(fit.effects), len(fit.vector), self.typical_error(fit)))
+        # Of those that predict loads held out alike, the most probable by the rows fitted.
+        self.found = max(near_best, key=lambda fit: self._fitted_log_odds(fit, self.base))
         while (self._leave_out_chance() or self._leave_out_unstable()
                or self._leave_out_undetermined()):
             pass
@@ -220,7 +220,8 @@ class BenchSelection:
         Leave out an effect that, given the others of the set, may well be none.
 
         It explains no more than chance: it was the best of all that could have been added to the
-        others, which are tested together. Or held-out rows make the others alone more probable.
+        others, which are tested together. Or the others alone are more probable, by rows held out
+        and by those fitted.
         What every loaded muscle has needs no such proof.
         """
         doubts: dict[str, tuple[float, str, Fit]] = {}
@@ -238,7 +239,7 @@ class BenchSelection:
             if value > SIGNIFICANCE:
                 doubts[effect.id] = (
                     1.0 + value, f'it explains no more than chance (p = {value:.2f})', smaller)
-            elif absent > 0.5:
+            elif absent > 0.5 and self._fitted_log_odds(self.found, smaller) < 0.0:
                 doubts[effect.id] = (
                     absent, f'it acts with a probability of {1.0 - absent:.2f}', smaller)
         if not doubts:
@@ -325,8 +326,7 @@ class BenchSelection:
         that of this mean; else the least load, for which the others are extrapolated, would decide
         alone. Differences below `least` count as none; by default below what matters.
         """
-        floor = (self.small_error() if least is None else least) ** 2
-        return float(np.exp(0.5 * np.mean(np.log(self._squares(fit) + floor))))
+        return self._typical(fit.held_out, self.small_error() if least is None else least)
 
     def typical_rmse(self, fit: Fit) -> float:
         """
@@ -334,7 +334,7 @@ class BenchSelection:
 
         It is less for one set than for another exactly where `typical_error` is.
         """
-        return float(significance.typical_rmse(self._squares(fit), self.small_error()))
+        return float(significance.typical_rmse(self._squares(fit.held_out), self.small_error()))
 
     def gain_interval(self, fit: Fit, base: Fit) -> tuple[float, float]:
         """Return the 95 % interval of the share by which a fit lowers a base's typical RMSE."""
@@ -342,10 +342,15 @@ class BenchSelection:
         return significance.typical_gain_interval(
             before, after, self.problem.block, self.problem.fold, self.small_error(), self._rng)
 
-    def _squares(self, fit: Fit) -> np.ndarray:
-        """Return the held-out mean square error of each fold, shape (folds,)."""
+    def _typical(self, response: np.ndarray, least: float) -> float:
+        """Return the geometric mean over the folds of the RMSE of a response (n,)."""
+        squares = np.maximum(self._squares(response) + least ** 2, 1e-300)
+        return float(np.exp(0.5 * np.mean(np.log(squares))))
+
+    def _squares(self, response: np.ndarray) -> np.ndarray:
+        """Return the mean square error of a response (n,) in each fold, shape (folds,)."""
         squares, rows = (np.bincount(self.problem.fold, weights=weights) for weights in (
-            (self.problem.measured - fit.held_out) ** 2, np.ones(len(fit.held_out))))
+            (self.problem.measured - response) ** 2, np.ones(len(response))))
         return squares[rows > 0] / rows[rows > 0]
 
     def small_error(self) -> float:
@@ -356,9 +361,21 @@ class BenchSelection:
         """Return the log posterior odds of a fit against another one; see `probabilities`."""
         count = len(np.unique(self.problem.block))
         prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
-        before, after = (max(self.typical_error(one, self.problem.noise), 1e-300)
-                         for one in (base, fit))
+        before, after = (self.typical_error(one, self.problem.noise) for one in (base, fit))
         return prior * (len(fit.effects) - len(base.effects)) + count * math.log(before / after)
+
+    def _fitted_log_odds(self, fit: Fit, base: Fit) -> float:
+        """
+        Return the log posterior odds of a fit against another one by the rows that both fit.
+
+        By Schwarz's criterion: as many independent rows as there are blocks, and each parameter
+        costs half the logarithm of their number.
+        """
+        count = len(np.unique(self.problem.block))
+        prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
+        before, after = (self._typical(one.predicted, self.problem.noise) for one in (base, fit))
+        return (prior * (len(fit.effects) - len(base.effects)) + count * math.log(before / after)
+                - 0.5 * math.log(count) * (len(fit.vector) - len(base.vector)))
 
     def _gains(self, fit: Fit, base: Fit) -> np.ndarray:
         """

@@ -3,15 +3,17 @@
 """
 Discrepancy of the base model: how wrong it is by itself, as a covariance of an arm's angles.
 
-It is known before the arm moves. The bench says how large the error of the length is under each
-load, on trials or loads that were held out; on the arm it shows as an error of the angle that is
-alike at neighbouring responses and at drives between which the response does little, and differs
-between the directions of the drive. What no load of the bench has shown may be off everywhere at
-once, as where the load's influence is: a load that the bench lacks would change the model about as
-much as one that it has does when it is left out. And the bench holds the load still, while an arm's load moves
-with the wire: what a load does in the middle of a transformation the bench cannot tell. Models that
-agree on every bench table bound that (`load_history`); but where one of them is an effect that is
-tried, it speaks for itself.
+It is known before the arm moves.
+
+* The bench says how large the error of the length is under each load, on trials or loads that were
+  held out. On the arm it shows as an error of the angle that is alike at neighbouring responses and
+  at drives between which the response does little, and differs between the directions of the drive.
+* What the loads of the bench say, they say of all rows of an arm at once. A load that the bench
+  lacks would change the model about as much as one that it has does when it is left out
+  (`model.replicates`; Efron, The Jackknife, the Bootstrap and Other Resampling Plans, 1982).
+* The bench holds the load still, while an arm's load moves with the wire: what a load does in the
+  middle of a transformation the bench cannot tell. Models that agree on every bench table bound
+  that (`load_history`); but where one of them is an effect that is tried, it speaks for itself.
 """
 
 from __future__ import annotations

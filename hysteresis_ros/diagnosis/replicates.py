@@ -8,8 +8,6 @@ from collections.abc import Iterator
 import dataclasses
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hysteresis_ros.diagnosis.bench_fit import MOST_EVALUATIONS, Response, TOLERANCE
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.identification.least_squares import folds_of
