@@ -7,9 +7,9 @@ The muscle stretches to ``L = L0 + S(F) f (H2[u] - L0) + e(F) + o`` with ``u = F
 the first stage's output (H1[V] in the paper's model) and F is what the arm asks for at its angle.
 At rest ``L(theta) = H2[F(theta) - x]``; the unknown is u, because H2 then gives everything else.
 Dry friction lets F lie in a band, inside which the arm sticks; viscous friction and inertia add
-what the present velocity and acceleration cost (see `swing`): by backward differences, of second
-order over equal steps, and while the arm rings by the method of Fox and Goodwin, Newmark's with
-beta = 1/12, whose phase is of fourth order.
+what the present velocity and acceleration cost (see `swing`): by backward differences of second
+order, and while the arm rings by the method of Fox and Goodwin, Newmark's with beta = 1/12, whose
+phase is of fourth order.
 """
 
 import bisect
@@ -26,15 +26,15 @@ from hysteresis_ros.effects.stages import Statics
 
 # Between two angles of the grid the linkage is a straight line, which costs less than 1e-6 rad.
 GRID = math.radians(0.1)
-# A step longer than this is a settled state to which dynamics contribute nothing.
+# A dt longer than this [s] leads to a settled state to which dynamics contribute nothing.
 LONGEST_TRANSIENT = 5.0
-# Longest step of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
+# Longest dt of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
 # would not be stable.
 LONGEST_PHASE = 0.7
-# What rings so fast that a sample would take more steps than this has come to rest by its end.
+# What rings so fast that a sample would take more parts than this has come to rest by its end.
 MOST_PIECES = 200
 # An arm whose inertia takes less than this share of the largest moment at rest, under a step of x
-# of less than this share of H2's range, does not ring, and is followed in longer steps.
+# of less than this share of H2's range, does not ring, and is followed by a longer dt.
 CALM, CALM_STEP, FADING = 0.005, 0.005, 0.97
 
 
