@@ -12,7 +12,7 @@ import pytest
 from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
-from hysteresis_ros.diagnosis.extend import extend
+from hysteresis_ros.diagnosis.extend import extend, extend_by_hand
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
@@ -91,6 +91,19 @@ def test_extending_a_bench_model_identifies_its_replicates_anew(model, tables):
     extended = extend(base, ['series_compliance'], [fitted]).model
     assert [[one.id for one in replicate.effects] for replicate in extended.replicates] == [
         [one.id for one in extended.effects]] * 4
+
+
+def test_values_given_by_hand_stay_in_the_replicates(model, tables):
+    fitted = tables[0].select(range(4))
+    base = model.with_effects([one for one in model.effects if one.id != 'series_compliance'])
+    given = effect_of(model, 'series_compliance', compliance=0.3)
+    extended = extend_by_hand(base, [given], [fitted]).model
+    for replicate in extended.replicates:
+        assert [one.values for one in replicate.effects] == [
+            one.values for one in extended.effects]
+    error = [np.sqrt(np.mean((predicted(extended, one, fitted) - fitted.column('length')) ** 2))
+             for one in extended.replicates]
+    assert len(set(error)) == 4     # the weights are not the same
 
 
 def test_a_model_without_effects_has_none(tables):

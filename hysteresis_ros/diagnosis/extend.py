@@ -221,7 +221,7 @@ def _gained(model: MuscleModel, problem: ArmProblem | BenchProblem,
     added = stages[-1][1]
     extended = _stamped(models[-1][1], added, train, problem.kind, by_hand)
     if problem.refits:
-        extended = with_replicates(extended, problem)
+        extended = with_replicates(extended, problem, by_hand)
     models[-1] = (models[-1][0], extended)
     steps = [(name, rmse(one, judged, model.effects)) for name, one in models]
     # Where weights are refitted, the fair base is one that was refitted to the same rows.

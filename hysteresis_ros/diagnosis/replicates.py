@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
 
 
-def with_replicates(model: MuscleModel, problem: BenchProblem) -> MuscleModel:
+def with_replicates(model: MuscleModel, problem: BenchProblem, by_hand: bool = False
+                    ) -> MuscleModel:
     """
     Return a model with H2 and effects as the bench gives them without each of its loads.
 
@@ -30,19 +31,24 @@ def with_replicates(model: MuscleModel, problem: BenchProblem) -> MuscleModel:
         As identified, with effects or without.
     problem : BenchProblem
         Of the rows that it was identified from.
+    by_hand : bool
+        Whether the effects keep their values, and only the weights are fitted.
 
     Returns
     -------
     MuscleModel
     """
-    return dataclasses.replace(model, replicates=list(_replicates(model, problem)))
+    return dataclasses.replace(model, replicates=list(_replicates(model, problem, by_hand)))
 
 
-def _replicates(model: MuscleModel, problem: BenchProblem) -> Iterator[Replicate]:
+def _replicates(model: MuscleModel, problem: BenchProblem, by_hand: bool
+                ) -> Iterator[Replicate]:
     stage, finer = model.length_stage, problem.finer()
     assert isinstance(stage, Preisach)      # no other one has effects on a bench
     for left_out in folds_of(problem.left_out_together):
-        response = Response(finer, [], model.effects, ~left_out)
-        effects = response.parameters.with_vector(response.minimise(
-            response.parameters.vector(), MOST_EVALUATIONS, TOLERANCE))
+        effects = model.effects
+        if not by_hand:
+            response = Response(finer, [], effects, ~left_out)
+            effects = response.parameters.with_vector(response.minimise(
+                response.parameters.vector(), MOST_EVALUATIONS, TOLERANCE))
         yield Replicate(problem.stage(effects, len(stage.nodes) - 1, ~left_out), effects)
