@@ -57,7 +57,8 @@ def monitoring_benchmarks(quick: bool) -> dict:
             NODE.format('monitor'), ros_arguments({'use_sim_time': 'true'}), environment))
         watcher = stack.enter_context(Watcher(context))
         # It has to see the arm cold, or it does not know what the muscle remembers.
-        watcher.until(lambda: int(watcher.said.get('angles predicted', 0)), 'the nodes')
+        watcher.until(lambda: watcher.times and int(watcher.said.get('angles predicted', 0)),
+                      'the nodes')
         begun, samples = time.monotonic(), len(watcher.times)
         spent = processor_time(monitor.pid)
         watcher.drive(QUICK_ARM_TIME if quick else ARM_TIME)

@@ -42,6 +42,7 @@ def inputs(report):
     return [int(number) for number in re.findall(r'inputs: (\d+)', report)]
 
 
+@pytest.mark.long
 def test_the_firmware_stands_half_a_minute_of_fuzzing(tmp_path):
     """Its decoder alone, and the whole board, with any C compiler."""
     built = f'BUILD={tmp_path}'
@@ -51,6 +52,7 @@ def test_the_firmware_stands_half_a_minute_of_fuzzing(tmp_path):
     assert decoder > 400 * DECODER_SECONDS and board > 30 * BOARD_SECONDS
 
 
+@pytest.mark.long
 def test_the_decoder_stands_half_a_minute_of_fuzzing(tmp_path, capsys):
     """With nothing but Python."""
     assert fuzz_decoder.main(['--seconds', str(DECODER_SECONDS),

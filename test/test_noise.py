@@ -27,7 +27,7 @@ def noisy(run, rho, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('error', [4e-4, 4e-5])
+@pytest.mark.parametrize('error', [4e-4, pytest.param(4e-5, marks=pytest.mark.long)])
 def test_intervals_under_noise_that_lasts_hold_the_truth_as_often_as_they_say(error):
     """
     Of 200 runs 181 to 197: what 95 % gives with a probability of 99 %.
@@ -48,7 +48,8 @@ def test_intervals_under_noise_that_lasts_hold_the_truth_as_often_as_they_say(er
 
 @pytest.mark.slow
 @pytest.mark.parametrize('trials, rho', [
-    (1, 0.98), pytest.param(2, 0.98, marks=pytest.mark.long),
+    pytest.param(1, 0.98, marks=pytest.mark.long),
+    pytest.param(2, 0.98, marks=pytest.mark.long),
     pytest.param(4, 0.9, marks=pytest.mark.long)])
 def test_nothing_is_named_where_noise_lasts(trials, rho):
     """
