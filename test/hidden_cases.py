@@ -16,15 +16,19 @@ TRIALS = {'length_trials': range(4), 'force_trials': [0]}
 UNIVERSAL = ['stress_dependence', 'stress_dependent_strain', 'series_compliance']
 
 
-@functools.cache
-def bench_model(seed):
-    """Return the model of a specimen's bench, on which nothing is hidden."""
-    tables = experiment_tables('bench', {}, seed)
+def clean_bench(seed, muscle='grains'):
+    """Return a plain model of a bench on which nothing is hidden, its length and force table."""
+    tables = experiment_tables('bench', {}, seed, muscle)
     force, length = (Measurement.from_columns(tables[name]) for name in
                      ('force.csv', 'length.csv'))
     geometry = BicepGeometry.from_mapping(GEOMETRY)
-    base = identify(length, force, geometry=geometry, **TRIALS).model
-    return add_effects(base, length, force, UNIVERSAL, **TRIALS)[0]
+    return identify(length, force, geometry=geometry, **TRIALS).model, length, force
+
+
+@functools.cache
+def bench_model(seed):
+    """Return the model of a specimen's bench with what every loaded muscle has."""
+    return add_effects(*clean_bench(seed), UNIVERSAL, **TRIALS)[0]
 
 
 def found_in(effects, seed, names=None, protocol='arm-dynamic', trials=(0, 1, 2, 3), every=1):

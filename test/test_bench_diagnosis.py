@@ -4,10 +4,10 @@
 
 import dataclasses
 
+from hidden_cases import clean_bench, TRIALS
 import numpy as np
 import pytest
 
-from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.cli.diagnose import to_text
 from hysteresis_ros.diagnosis import bench_selection, significance
 from hysteresis_ros.diagnosis.bench_effects import add_effects
@@ -20,7 +20,6 @@ from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import bench_tables, experiment_tables
-from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.measurements import Measurement
 
 ROWS, STEP = 120, 2.0
@@ -307,12 +306,8 @@ def test_an_extended_model_says_what_was_fitted():
 
 def test_the_elasticity_of_the_wire_is_added_to_what_the_bench_proves():
     """Constant loads cannot prove it; on an arm it is needed."""
-    tables = experiment_tables('bench', {}, 3)
-    force, length = (Measurement.from_columns(tables[name]) for name in
-                     ('force.csv', 'length.csv'))
-    trials = {'length_trials': range(4), 'force_trials': [0]}
-    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
-    extended, added = add_effects(model, length, force, **trials)
+    model, length, force = clean_bench(3)
+    extended, added = add_effects(model, length, force, **TRIALS)
     assert {effect.id for effect in added} == {
         'stress_dependence', 'stress_dependent_strain', 'series_compliance'}
     # Austenite of the laboratory's wire: 0.14 mm/N; martensite: 0.27 mm/N.

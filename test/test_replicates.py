@@ -150,6 +150,21 @@ def test_what_is_fitted_anew_on_an_arm_keeps_its_values():
     assert replicate.instead_of(own, [lag]) == [lag]
 
 
+def test_what_an_arm_has_shown_stays_in_the_replicates_of_the_extended_model():
+    """Else the next diagnosis would take it for an error that the model may have of itself."""
+    model = small_model()
+    shifted = model.with_effects([model.effects[0].with_values(shift=0.1), model.effects[1]])
+    run = runs(dataclasses.replace(shifted, replicates=[]))
+    extended = extend(model, ['stress_dependence'], [run]).model
+    found, = [one for one in extended.effects if one.id == 'stress_dependence']
+    assert found.shift == pytest.approx(0.1, abs=0.02)
+    for replicate, before in zip(extended.replicates, model.replicates):
+        values = {one.id: one.values for one in replicate.effects}
+        assert values['stress_dependence'] == {
+            **before.effects[0].values, 'shift': found.shift}
+        assert values['series_compliance'] == before.effects[1].values
+
+
 def test_the_discrepancy_has_the_mean_square_of_what_a_load_left_out_changes():
     model = small_model()
     problem = problem_for(model, [runs(model)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.diagnosis.significance import (
-    block_sums, cosines, gain_interval, paired_p_values, residualise)
+    block_sums, cosines, gain_interval, paired_p_values, residualise, schwarz_log_odds)
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():
@@ -46,3 +46,20 @@ def test_cosines_and_the_residual_of_columns():
     assert residual[2] == pytest.approx([0.0, 0.0, 0.0])
     assert residual[0] == pytest.approx([0.5, -0.5, 0.0])
     assert residualise(np.zeros((3, 0)), vectors) is vectors
+
+
+def test_schwarz_odds_are_those_of_hand_and_find_the_true_number_of_parameters():
+    """A column of noise beside a line pays for itself as often as chi squared exceeds log n."""
+    assert schwarz_log_odds(2.0, 1.0, 16, 3) == pytest.approx(
+        16.0 * np.log(2.0) - 1.5 * np.log(16.0))
+    rng, rows, draws = np.random.default_rng(5), 24, 2000
+    preferred = 0
+    for _ in range(draws):
+        true, noise, measured = rng.standard_normal((3, rows))
+        errors = []
+        for columns in ([true], [true, noise]):
+            design = np.column_stack(columns)
+            found = design @ np.linalg.lstsq(design, measured + 3.0 * true, rcond=None)[0]
+            errors.append(np.sqrt(np.mean((measured + 3.0 * true - found) ** 2)))
+        preferred += schwarz_log_odds(*errors, rows, 1) > 0.0
+    assert 0.06 < preferred / draws < 0.11

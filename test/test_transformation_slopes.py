@@ -4,6 +4,7 @@
 
 import dataclasses
 
+from hidden_cases import clean_bench, TRIALS
 import numpy as np
 import pytest
 
@@ -15,7 +16,6 @@ from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.laboratory import sequences
 from hysteresis_ros.laboratory.bench import Bench
 from hysteresis_ros.laboratory.conditions import Conditions
-from hysteresis_ros.laboratory.experiments import experiment_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import specimen
 from hysteresis_ros.measurements import Measurement
@@ -153,12 +153,7 @@ def test_slopes_that_differ_are_named_on_the_bench_and_no_r_phase():
 @pytest.mark.slow
 def test_where_loads_left_out_tell_little_the_rows_fitted_decide():
     """Without slopes C followed the strain, and loads left out were predicted as well."""
-    tables = experiment_tables('bench', {}, 7403, 'lagoudas')
-    force, length = (Measurement.from_columns(tables[name]) for name in
-                     ('force.csv', 'length.csv'))
-    trials = {'length_trials': range(4), 'force_trials': [0]}
-    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
-    _, added = add_effects(model, length, force, **trials)
+    _, added = add_effects(*clean_bench(7403, 'lagoudas'), **TRIALS)
     assert {effect.id for effect in added} == {
         'stress_dependence', 'stress_dependent_strain', 'series_compliance',
         'transformation_slopes'}

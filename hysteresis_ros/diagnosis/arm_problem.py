@@ -109,8 +109,12 @@ class ArmProblem(Problem):
         return np.array(responses).reshape(len(responses), len(self.measured))
 
     def completed(self, effects: Sequence[Effect]) -> MuscleModel:
-        """Return the model with these effects."""
-        return self.model.with_effects(effects)
+        """Return the model and its replicates with these effects."""
+        model = self.model.with_effects(effects)
+        model.replicates = [
+            dataclasses.replace(one, effects=one.instead_of(self.model.effects, effects))
+            for one in model.replicates]
+        return model
 
     def weight_columns(self, effects: Sequence[Effect]) -> np.ndarray:
         """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""

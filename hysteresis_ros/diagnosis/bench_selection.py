@@ -368,14 +368,13 @@ class BenchSelection:
         """
         Return the log posterior odds of a fit against another one by the rows that both fit.
 
-        By Schwarz's criterion: as many independent rows as there are blocks, and each parameter
-        costs half the logarithm of their number.
+        By Schwarz's criterion, with as many independent rows as there are blocks.
         """
         count = len(np.unique(self.problem.block))
         prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
         before, after = (self._typical(one.predicted, self.problem.noise) for one in (base, fit))
-        return (prior * (len(fit.effects) - len(base.effects)) + count * math.log(before / after)
-                - 0.5 * math.log(count) * (len(fit.vector) - len(base.vector)))
+        return (prior * (len(fit.effects) - len(base.effects)) + significance.schwarz_log_odds(
+            before, after, count, len(fit.vector) - len(base.vector)))
 
     def _gains(self, fit: Fit, base: Fit) -> np.ndarray:
         """

@@ -6,6 +6,8 @@ Whether sets of effects explain more of held-out rows than the best of them woul
 All sets are tested together, because the family-wise error of the whole catalogue counts.
 """
 
+import math
+
 import numpy as np
 
 DRAWS = 400
@@ -68,6 +70,31 @@ def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
     # Of one fold, whose error always matters, the typical RMSE is the RMSE.
     return typical_gain_interval(before, after, block, np.zeros(len(block), dtype=int), 0.0, rng,
                                  level, count)
+
+
+def schwarz_log_odds(before: float, after: float, rows: int, parameters: int) -> float:
+    """
+    Return the log odds of a least squares fit against one with fewer parameters.
+
+    Of n independent rows of unknown variance, to the order of log n (Schwarz, Ann. Stat. 6 (1978)
+    461)::
+
+        n log(before / after) - (k / 2) log n
+
+    Parameters
+    ----------
+    before, after : float
+        RMSE with fewer and with more parameters, in the same unit.
+    rows : int
+        n.
+    parameters : int
+        k, how many more there are.
+
+    Returns
+    -------
+    float
+    """
+    return rows * math.log(before / after) - 0.5 * math.log(rows) * parameters
 
 
 def typical_rmse(squares: np.ndarray, small: float) -> np.ndarray:
