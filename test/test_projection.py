@@ -15,6 +15,7 @@ from hysteresis_ros.operators import cell_areas, signed_areas
 from hysteresis_ros.operators.areas import signed_lengths
 import numpy as np
 import pytest
+from scipy import sparse
 
 
 def test_derivatives_are_finite_differences_with_the_active_set_fixed():
@@ -22,7 +23,7 @@ def test_derivatives_are_finite_differences_with_the_active_set_fixed():
     design, slope = rng.normal(size=(2, 20, 30))
     design[:, -1], slope[:, -1] = 1.0, 0.0
     target, drift = rng.normal(size=(2, 20))
-    penalty = 1e-3 * np.diag(np.append(np.ones(29), 0.0))
+    penalty = sparse.diags(np.append(np.full(29, 1e-3), 0.0), format='csr')
     fitted, step = ProjectedWeights(design, target, penalty), 1e-6
     columns = fitted.columns
     assert 1 < len(columns) < 30

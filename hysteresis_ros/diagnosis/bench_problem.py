@@ -16,6 +16,7 @@ import functools
 from typing import Any, Literal, TYPE_CHECKING, TypeVar
 
 import numpy as np
+from scipy import sparse
 
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import Effect, SensorEffect
@@ -190,7 +191,7 @@ class BenchProblem(Problem):
         self._passive: dict[bytes | None, np.ndarray] = {}
         self._courses: dict[tuple, Course] = {}
         self._excitations: dict[tuple, Excitation] = {}
-        self._square: np.ndarray | None = None
+        self._square: sparse.csr_matrix | None = None
         self._phases_of: tuple | None = None
         self._known_phases: list[np.ndarray] = []
 
@@ -425,7 +426,7 @@ class BenchProblem(Problem):
         self._passive[key] = found.passive
         return found
 
-    def _penalty(self, nodes: np.ndarray) -> np.ndarray:
+    def _penalty(self, nodes: np.ndarray) -> sparse.csr_matrix:
         """Return the square of the penalty, shape (K + 1, K + 1)."""
         if self._square is None:
             self._square = self._strength * _square(len(nodes) - 1)
@@ -467,10 +468,11 @@ class BenchProblem(Problem):
 
 
 @functools.lru_cache(maxsize=4)
-def _square(levels: int) -> np.ndarray:
+def _square(levels: int) -> sparse.csr_matrix:
     """Return the square of the penalty's root; it is the same for all grids of equal intervals."""
-    root = smoothness(np.linspace(0.0, 1.0, levels + 1), reversible=True)
-    return np.pad(root.T @ root, (0, 1))
+    root = sparse.csr_matrix(np.pad(
+        smoothness(np.linspace(0.0, 1.0, levels + 1), reversible=True), ((0, 0), (0, 1))))
+    return (root.T @ root).tocsr()
 
 
 def _remember(found: dict[tuple, Entry], key: tuple, value: Entry) -> None:

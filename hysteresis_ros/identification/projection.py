@@ -9,8 +9,9 @@ at their bound stay there, so that each takes one small linear problem instead o
 """
 
 import numpy as np
+from scipy import sparse
 
-from hysteresis_ros.identification.nonnegative import solve, solve_rows
+from hysteresis_ros.identification.nonnegative import part_of, solve, solve_rows
 
 
 class ProjectedWeights:
@@ -22,7 +23,7 @@ class ProjectedWeights:
     design : ndarray, shape (n, K)
         The last column is that of the bias.
     target : ndarray, shape (n,)
-    penalty : ndarray, shape (K, K)
+    penalty : csr_matrix, shape (K, K)
     start : ndarray of bool, shape (K,), optional
         `passive` of a neighbouring problem.
 
@@ -35,13 +36,13 @@ class ProjectedWeights:
         The same as indices.
     """
 
-    def __init__(self, design: np.ndarray, target: np.ndarray, penalty: np.ndarray,
+    def __init__(self, design: np.ndarray, target: np.ndarray, penalty: sparse.csr_matrix,
                  start: np.ndarray | None = None):
         free = np.zeros(design.shape[1], dtype=bool)
         free[-1] = True
         self.z, self.passive = solve_rows(design, target, penalty, free, start)
         self.columns = np.flatnonzero(self.passive)
-        self._penalty = penalty[np.ix_(self.columns, self.columns)]
+        self._penalty = part_of(penalty, self.columns)
 
     def moved(self, design: np.ndarray, target: np.ndarray) -> np.ndarray:
         """
