@@ -57,7 +57,7 @@ class Fit:
     predicted : ndarray, shape (n,)
         Response with them.
     jacobian : ndarray, shape (n, k)
-        Derivatives of `predicted`.
+        Derivatives of `predicted`; empty on a bench, where only the sets found need them.
     log_evidence : float
         Laplace's approximation; see `Fitter.judge`.
     values : ndarray, shape (4,), or None
@@ -80,7 +80,7 @@ class Fit:
     effects: list[Effect]
     vector: np.ndarray
     predicted: np.ndarray
-    jacobian: np.ndarray
+    jacobian: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     log_evidence: float = -np.inf
     values: np.ndarray | None = None
     spread: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))

@@ -79,8 +79,7 @@ class Response:
         effects = self.parameters.with_vector(vector)
         free = ParameterVector(effects, self.problem.kind).entries
         kept = [entry in free for entry in self.parameters.entries]
-        return Fit(effects, vector[kept], self.predicted(vector), self.jacobian(vector)[:, kept],
-                   duration=self.problem.duration)
+        return Fit(effects, vector[kept], self.predicted(vector), duration=self.problem.duration)
 
     def predicted(self, vector: np.ndarray) -> np.ndarray:
         """Return the response of all rows, shape (n,)."""
@@ -218,10 +217,13 @@ class BenchFitter:
         From the Jacobian, with the residuals summed by block (a sandwich estimate), because
         residuals of a simulated response are correlated.
         """
-        parameters = ParameterVector(fit.effects, self.problem.kind)
+        response = Response(self.problem, self.fixed, fit.effects)
+        parameters = response.parameters
         if len(parameters) == 0:
             return fit.effects
-        jacobian = fit.jacobian
+        jacobian = response.jacobian(fit.vector)
+        if not np.all(np.isfinite(jacobian)):
+            return parameters.with_intervals(fit.vector, np.full(len(parameters), np.inf))
         error = self.problem.measured - fit.predicted
         size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
         normal = (jacobian / size).T @ (jacobian / size)

@@ -498,5 +498,4 @@ def _vanished(effect: Effect) -> bool:
 
 
 def _finite(fit: Fit) -> Fit | None:
-    finite = np.all(np.isfinite(fit.predicted)) and np.all(np.isfinite(fit.jacobian))
-    return fit if finite else None
+    return fit if np.all(np.isfinite(fit.predicted)) else None

@@ -14,6 +14,7 @@ a controller can undo it. Effects with dynamics or memory of their own carry it 
 
 import abc
 from collections.abc import Mapping
+import copy
 import dataclasses
 import math
 from typing import Any, ClassVar, NamedTuple, TypeAlias
@@ -199,15 +200,18 @@ class Effect(abc.ABC):
 
     def __init__(self, surroundings: Surroundings | None = None, **values: float) -> None:
         self.parameters = self.describe(surroundings)
-        names = [parameter.name for parameter in self.parameters]
+        self._begin({parameter.name: parameter.neutral for parameter in self.parameters}, values)
+
+    def _begin(self, known: Mapping[str, float], values: Mapping[str, float]) -> None:
+        """Take over known values and new ones, with no intervals and no past."""
+        self.values = {name: float(value) for name, value in known.items()}
         for name, value in values.items():
-            if name not in names:
+            if name not in known:
                 raise ParameterError(
-                    f'effect {self.id} has no parameter {name!r}; it has {", ".join(names)}')
+                    f'effect {self.id} has no parameter {name!r}; it has {", ".join(known)}')
             if not math.isfinite(value):
                 raise ParameterError(f'effect {self.id}: {name} must be finite, not {value!r}')
-        self.values = {parameter.name: float(values.get(parameter.name, parameter.neutral))
-                       for parameter in self.parameters}
+            self.values[name] = float(value)
         self.intervals: dict[str, tuple[float, float]] = {}
         self.start()
 
@@ -257,9 +261,9 @@ class Effect(abc.ABC):
         ParameterError
             For a name it does not have or a value that is not finite.
         """
-        copy = type(self)(None, **{**self.values, **values})
-        copy.parameters = self.parameters
-        return copy
+        other = copy.copy(self)
+        other._begin(self.values, values)
+        return other
 
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
         """
