@@ -478,6 +478,32 @@ def test_limits_can_change_while_it_runs(boards):
         board.set_voltage(4.0)
 
 
+def test_limit_below_the_voltage_that_is_held_lowers_it(boards):
+    board = online(boards('sim://bicep?speed=5'))
+    board.enable(True)
+    board.set_voltage(5.0)
+    until(lambda: board.status.sample.voltage == pytest.approx(5.0, abs=0.02), 'the voltage')
+    board.pwm = Pwm(maximum_voltage=3.0)
+    board.set_voltage(3.0)
+    until(lambda: board.status.sample.voltage == pytest.approx(3.0, abs=0.02), 'the new limit')
+    board.pwm = Pwm(maximum_voltage=2.0)
+    until(lambda: board.status.sample.voltage == pytest.approx(2.0, abs=0.02), 'the lower limit')
+    assert 'maximum_voltage was lowered' in board.status.limit
+
+
+def test_error_in_the_writing_thread_switches_off_and_reconnects(boards, monkeypatch):
+    board = online(boards('sim://bicep?speed=5'))
+    connections = board.status.connections
+    with monkeypatch.context() as broken:
+        broken.setattr(Board, '_commands', lambda _: 1 / 0)
+        board.set_voltage(1.0)
+        until(lambda: 'unexpected ZeroDivisionError' in board.status.problem, 'the problem')
+    until(lambda: board.status.connections > connections and board.status.online, 'the board')
+    board.enable(True)
+    board.set_voltage(2.0)
+    until(lambda: board.status.sample.voltage == pytest.approx(2.0, abs=0.02), 'the voltage')
+
+
 def test_counter_of_16_bits_is_what_the_board_says(boards):
     def answer(data):
         out = b''

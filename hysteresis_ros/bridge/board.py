@@ -440,16 +440,22 @@ class Board:
                 self._news = False
                 if self._stopping.is_set():
                     return
-                commands = self._commands() if self._online else []
             try:
-                for kind, fields in commands:
-                    sequence = self._link.send(kind, fields)
-                    if kind == CONFIG:
-                        self._config.sent(sequence)
-                    elif kind == SET:
-                        self._note_sent(sequence)
+                self._send_due()
             except (BoardError, ProtocolError) as error:
                 self._write_problem = error
+            except Exception as error:     # whatever it is: the muscle off, and on with the loop
+                self._write_problem = BoardError(f'port {self._link.port}: unexpected {error!r}')
+
+    def _send_due(self) -> None:
+        with self._wake:
+            commands = self._commands() if self._online else []
+        for kind, fields in commands:
+            sequence = self._link.send(kind, fields)
+            if kind == CONFIG:
+                self._config.sent(sequence)
+            elif kind == SET:
+                self._note_sent(sequence)
 
     def _commands(self) -> list[tuple[str, Fields | None]]:
         """Return what the board has to hear now: (kind, fields) each."""
@@ -484,12 +490,17 @@ class Board:
                 f'the supply measures {supply:.3g} V, {self._nominal_supply:g} V expected: '
                 'output off; check the supply and the parameter supply_voltage')
             return 0.0
+        pwm, asked, lowered = self.pwm, self._target[0], ''
+        if asked > pwm.maximum_voltage:
+            lowered = (f'{asked:g} V asked, {pwm.maximum_voltage:g} V given: maximum_voltage was '
+                       'lowered since')
+            asked = pwm.maximum_voltage
         voltage, protected, self._ramping = self.protection.limit(
-            self._target[0], self._board_time(), RAMP_DT * self.speed,
+            asked, self._board_time(), RAMP_DT * self.speed,
             2.0 * self._timeouts.keepalive * self.speed)
         # Below minimum_voltage there is nothing but off.
-        drive = self.pwm.drive(voltage if voltage >= self.pwm.minimum_voltage else 0.0, supply)
-        self._limit = drive.limit or protected
+        drive = pwm.drive(voltage if voltage >= pwm.minimum_voltage else 0.0, supply)
+        self._limit = drive.limit or protected or lowered
         return drive.duty
 
     def _say_zero(self) -> None:
