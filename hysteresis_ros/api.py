@@ -425,6 +425,9 @@ def _geometry(geometry: Geometry) -> BicepGeometry:
         return BicepGeometry.from_yaml(geometry)
     if isinstance(geometry, Mapping):
         return BicepGeometry.from_written(geometry)
+    if not isinstance(geometry, BicepGeometry):
+        raise ParameterError(f'a geometry cannot be a {type(geometry).__name__}; give a path, a '
+                             'mapping or a BicepGeometry')
     return geometry
 
 

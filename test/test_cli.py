@@ -368,8 +368,8 @@ def test_a_bad_model_is_one_line(bench, tmp_path, capsys, text, words):
     (['identify', '--force', 'BENCH/length.csv', '-o', 'BENCH/x.yaml'], 'swapped'),
     (['identify', '--length', 'BENCH/length.csv', '--length-trials', '0,77', '-o',
       'BENCH/x.yaml'], 'trial 77'),
-    (['identify', '--length', 'BENCH/length.csv', '--levels', '0', '5', '-o', 'BENCH/x.yaml'],
-     'levels'),
+    (['identify', '--length', 'BENCH/length.csv', '--levels', '5', '101', '-o', 'BENCH/x.yaml'],
+     'levels must be two numbers from 1 to 100, not [5, 101]'),
     (['invert', '--model', 'BENCH/model.yaml', '--reference', 'BENCH/geometry.yaml', '-o',
       'x.csv'], 'geometry.yaml: a YAML file, no table')])
 def test_what_cannot_be_done_is_one_line(bench, capsys, arguments, words):
@@ -391,7 +391,12 @@ def test_invert_says_which_column_is_missing(bench, tmp_path, capsys):
     ['simulate', 'bench', '-o', 'x', '--effect', 'creep=much'],
     ['identify', '--force', 'f', '--force-trials', '3-1', '-o', 'x'],
     ['compare', '--model', 'm', '--data', 'd', '--columns', 'angel=theta'],
-    ['identify', '--length', 'l', '--operator', 'magic', '-o', 'x']])
+    ['identify', '--length', 'l', '--operator', 'magic', '-o', 'x'],
+    ['identify', '--length', 'l', '--levels', '0', '5', '-o', 'x'],
+    ['diagnose', '--model', 'm', '--data', 'd', '--seed', '-1'],
+    ['diagnose', '--model', 'm', '--data', 'd', '--jobs', '0'],
+    ['diagnose', '--model', 'm', '--data', 'd', '--jobs', '-5'],
+    ['demo', '--seed', '-1']])
 def test_wrong_usage_has_status_2(arguments, capsys):
     with pytest.raises(SystemExit) as left:
         main(arguments)

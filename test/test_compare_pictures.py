@@ -8,6 +8,7 @@ import re
 from types import SimpleNamespace
 
 from hypothesis import given, strategies
+from hysteresis_ros.cli.compare import PICTURES
 from hysteresis_ros.report import page
 from hysteresis_ros.comparison.compare import compare
 from hysteresis_ros.report.comparison_page import comparison_page, rendered, trials
@@ -77,7 +78,7 @@ def test_a_lag_shows_against_the_time_since_a_step(comparison):
     geometry = SimpleNamespace(force=lambda theta: 5 - theta, angle_range=(0.5, 2.5))
     model = FakeModel(geometry=geometry)
     drawn = figures(compare(model, [stepped()]))
-    assert {'since_step', 'plane'} <= set(drawn)
+    assert {'since_step', 'plane'} <= set(drawn) <= set(PICTURES)
     axis = drawn['since_step'].axes[0]
     assert axis.get_xscale() == 'log'
     rise, fall = (container.lines[0].get_ydata() for container in axis.containers)

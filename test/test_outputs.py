@@ -27,7 +27,12 @@ def options(command):
 
 def of_kind(command, *kinds):
     """Return the names of a command's options of some kinds."""
-    return [action.option_strings[-1] for action in options(command) if action.type in kinds]
+    return [action.option_strings[-1] for action in options(command) if takes(action, kinds)]
+
+
+def takes(action, kinds):
+    """Whether an option's type is one of some kinds of path."""
+    return isinstance(action.type, type) and issubclass(action.type, kinds)
 
 
 def arguments(command, tmp_path, paths):
@@ -41,10 +46,10 @@ def arguments(command, tmp_path, paths):
         name = (action.option_strings or [''])[-1]
         if name in paths:
             value = paths[name]
-        elif action.type is InputPath:
+        elif takes(action, InputPath):
             value = tmp_path / f'{name[2:]}.input'
             value.write_bytes(b'precious')
-        elif action.required and action.type in PATHS:
+        elif action.required and takes(action, PATHS):
             value = tmp_path / 'new'
         elif action.required:
             value = WORDS[action.dest]
@@ -189,6 +194,23 @@ def test_a_folder_that_cannot_be_made_is_said_before_any_work(
     line = refused(arguments(command, tmp_path, {output: 'new/newer'}), capsys)
     assert f'{output} new/newer: cannot be written (Permission denied)' in line
     assert not (tmp_path / 'new').exists()
+
+
+def test_a_file_in_a_folder_of_outputs_is_protected_under_its_name(tmp_path, capsys):
+    """A picture's name may be a link to an input, or that of another output."""
+    folder = tmp_path / 'pictures'
+    folder.mkdir()
+    paths = {'--plots': folder, '--report': folder / 'loop.png'}
+    line = refused(arguments('compare', tmp_path, paths), capsys)
+    assert 'is also written by' in line and '--plots' in line and '--report' in line
+    del paths['--report']
+    (folder / 'loop.png').symlink_to(tmp_path / 'model.input')
+    line = refused(arguments('compare', tmp_path, paths), capsys)
+    assert f'--plots {folder / "loop.png"}: would overwrite the input --model' in line
+    assert (tmp_path / 'model.input').read_bytes() == b'precious'
+    line = refused(arguments('demo', tmp_path, {
+        '--output': tmp_path / 'demo', '--json': tmp_path / 'demo' / 'model.yaml'}), capsys)
+    assert 'is also written by' in line and not (tmp_path / 'demo').exists()
 
 
 def test_an_older_output_is_written_over(tmp_path):

@@ -64,6 +64,26 @@ def numbers(text: str) -> list[int]:
     return found
 
 
+def count(text: str) -> int:
+    """Return a positive whole number."""
+    number = seed(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f'{text!r} is not a positive whole number')
+    return number
+
+
+def seed(text: str) -> int:
+    """Return a whole number from 0 on."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f'{text!r} is not a whole number from 0 on')
+    return int(text)
+
+
+def processes(text: str) -> int:
+    """Return a positive number of processes, or -1 for one on each core."""
+    return -1 if text == '-1' else count(text)
+
+
 def add_data(parser: argparse.ArgumentParser, name: str = '--data', required: bool = True) -> None:
     """Add the option that names measurements, and how bags are read."""
     parser.add_argument(name, nargs='+', type=InputPath, required=required, metavar='FILE',

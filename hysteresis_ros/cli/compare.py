@@ -20,6 +20,17 @@ if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
 
 
+# Names of the pictures that there can be; see `report.plots.figures`.
+PICTURES = ('overlay', 'signals', 'loop', 'waterfall', 'plane', 'since_step', 'correlogram',
+            'coverage')
+
+
+class PicturesFolder(OutputFolder):
+    """A folder for the pictures of a comparison."""
+
+    names = tuple(f'{name}.png' for name in PICTURES)
+
+
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
@@ -32,7 +43,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     add_settled(parser)
     add_json(parser)
     add_report(parser)
-    parser.add_argument('--plots', type=OutputFolder, metavar='DIR',
+    parser.add_argument('--plots', type=PicturesFolder, metavar='DIR',
                         help='write the pictures as PNG files')
     return parser
 

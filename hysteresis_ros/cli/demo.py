@@ -14,7 +14,8 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.atomic import AnyPath, write_bytes, write_text
-from hysteresis_ros.cli.common import add_json, progress, say, Subparsers, write_json
+from hysteresis_ros.cli.common import (
+    add_json, count, progress, say, seed, Subparsers, write_json)
 from hysteresis_ros.cli.outputs import OutputFolder
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements import Measurement, settled_rows
@@ -31,6 +32,14 @@ VALUES = 40
 MARK = '.hysteresis_demo'
 ENTRIES = ('bench', 'model.yaml', 'run', 'run.log', 'extended.yaml', 'run_extended',
            'run_extended.log', 'demo.png')
+
+
+class DemoFolder(OutputFolder):
+    """The folder of a demo, with what it writes there."""
+
+    names = (MARK, *ENTRIES)
+
+
 # Time for which a target is held [s]: until the arm rests, or while it is still on its way, at
 # which the arm's time may not run much faster than the nodes can follow.
 SETTLED_HOLD = 30.0
@@ -54,15 +63,15 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
         'rosbag2 bag, reads it back, and compares: the rows of Table I for the arm. With --hidden '
         'a physical effect is hidden in the arm, found, added to the model, and the arm driven '
         'again.')
-    parser.add_argument('-o', '--output', type=OutputFolder, default='demo', metavar='DIR',
+    parser.add_argument('-o', '--output', type=DemoFolder, default='demo', metavar='DIR',
                         help='folder for everything that is written (default: demo)')
-    parser.add_argument('--seed', type=int, default=1, metavar='S', help='of arm and sequences')
+    parser.add_argument('--seed', type=seed, default=1, metavar='S', help='of arm and sequences')
     parser.add_argument('--speed', type=float, metavar='X',
                         help="the arm's time against the wall clock's (default: 60)")
     parser.add_argument('--port', metavar='PORT',
                         help='avr://, the firmware for the board in simavr, at --speed 0.8 and '
                         'with 4 --values unless others are given; default: the simulated board')
-    parser.add_argument('--values', type=int, metavar='N',
+    parser.add_argument('--values', type=count, metavar='N',
                         help='targets in each sequence (default: 40)')
     parser.add_argument('--effects', choices=('none', 'auto'), default='none',
                         help="none: the paper's model (default); auto: with what the bench proves")

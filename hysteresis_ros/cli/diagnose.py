@@ -9,8 +9,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, add_trials, divided, origin, read_all,
-    say, Subparsers, warn_of_loads, write_json)
+    add_data, add_json, add_model, add_report, add_settled, add_trials, divided, origin, processes,
+    read_all, say, seed, Subparsers, warn_of_loads, write_json)
 from hysteresis_ros.cli.rounds import BENCH, Rounds
 
 if TYPE_CHECKING:
@@ -31,9 +31,9 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     add_data(parser)
     add_settled(parser)
     add_trials(parser, 'the others are not looked at')
-    parser.add_argument('--jobs', type=int, default=-1, metavar='N',
-                        help='processes (default: one for each core)')
-    parser.add_argument('--seed', type=int, default=0, metavar='S',
+    parser.add_argument('--jobs', type=processes, default=-1, metavar='N',
+                        help='processes (default: -1, one for each core)')
+    parser.add_argument('--seed', type=seed, default=0, metavar='S',
                         help='of the random draws behind the p values (default: 0)')
     add_json(parser)
     add_report(parser)

@@ -9,7 +9,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_columns, add_json, bench_tables, numbers, say, Steps, Subparsers, warn,
+    add_columns, add_json, bench_tables, count, numbers, say, Steps, Subparsers, warn,
     write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.cli.rounds import BENCH, Rounds
@@ -40,7 +40,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         help='trials of the length table to fit (default: all)')
     parser.add_argument('--geometry', type=InputPath, metavar='G.yaml',
                         help='the arm that the muscle will move')
-    parser.add_argument('--levels', nargs=2, type=int, default=(10, 20), metavar=('N1', 'N2'),
+    parser.add_argument('--levels', nargs=2, type=count, default=(10, 20), metavar=('N1', 'N2'),
                         help='levels of H1 and H2 (default: 10 20)')
     parser.add_argument('--operator', choices=OPERATORS,
                         help='default: two-stage with a force table, preisach without a load, '

@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Iterator
 import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from hysteresis_ros.atomic import check_writable
 from hysteresis_ros.errors import ParameterError
@@ -31,7 +31,17 @@ class OutputFileOrStdout(OutputFile):
 
 
 class OutputFolder(str):
-    """A folder that a command writes files to; it is made where it is missing."""
+    """
+    A folder that a command writes to; it is made where it is missing.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What is written there, as far as something of the same command could lie there, too.
+
+    """
+
+    names: ClassVar[tuple[str, ...]] = ()
 
 
 class Given(NamedTuple):
@@ -66,10 +76,12 @@ def check_paths(args: argparse.Namespace) -> None:
     for any_path in [*inputs, *folders, *files]:
         if not any_path.path:
             raise ParameterError(f'{any_path.option}: the path is empty; name a file or folder')
-    for output in [*folders, *files]:
+    inside = [Given(folder.option, os.path.join(folder.path, name)) for folder in folders
+              for name in getattr(folder.path, 'names', ())]
+    for output in [*folders, *inside, *files]:
         for read in inputs:
             refuse_input(output, read)
-    refuse_twice([*folders, *files])
+    refuse_twice([*folders, *inside, *files])
     for folder in folders:
         check_folder(folder)
     made = {os.path.realpath(folder.path) for folder in folders}

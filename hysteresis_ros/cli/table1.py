@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from hysteresis_ros.cli.common import add_json, progress, say, Subparsers, write_json
+from hysteresis_ros.cli.common import (
+    add_json, count, progress, say, seed, Subparsers, write_json)
 
 HEADERS = {'two-stage': 'two-stage', 'linear': 'linear', 'with effects': '+ effects'}
 
@@ -33,21 +34,6 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         help='processes for the search of effects (default: 1)')
     add_json(parser)
     return parser
-
-
-def count(text: str) -> int:
-    """Return a positive whole number."""
-    number = seed(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f'{text!r} is not a positive whole number')
-    return number
-
-
-def seed(text: str) -> int:
-    """Return a whole number from 0 on."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f'{text!r} is not a whole number from 0 on')
-    return int(text)
 
 
 def run(args: argparse.Namespace) -> None:

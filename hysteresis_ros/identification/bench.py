@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from hysteresis_ros.operators import HysteresisOperator
 
 LEVELS = (10, 20)
+# Of one operator; its least squares take memory with the fourth power, 0.2 GB for as many.
+MOST_LEVELS = 100
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
@@ -215,8 +217,9 @@ def identify(length: Measurement | None = None, force: Measurement | None = None
     if force is not None and length is not None and force.drive != length.drive:
         raise IdentificationError(f'the force table is driven by {force.drive}, the length table '
                                   f'by {length.drive}; they have to be of one muscle')
-    if len(levels) != 2 or min(levels) < 1:
-        raise IdentificationError(f'levels must be two positive numbers, not {levels}')
+    if len(levels) != 2 or not 1 <= min(levels) <= max(levels) <= MOST_LEVELS:
+        raise IdentificationError(
+            f'levels must be two numbers from 1 to {MOST_LEVELS}, not {levels}')
     kind = 'preisach' if operator in ('two-stage', 'preisach') else operator
     recipe = Recipe(kind, anchored, plain)
     model = MuscleModel(
