@@ -196,6 +196,8 @@ def test_memory_that_does_not_fit_is_refused_and_changes_nothing():
               {**good, 'pacing': {**good['pacing'], 'travel': 'far'}},
               {**good, 'pacing': {**good['pacing'], 'drive': math.inf}},
               {**good, 'targets': {**good['targets'], 'mood': 1.0}},
+              {**good, 'targets': {**good['targets'], 'direction': None}},
+              {**good, 'targets': {**good['targets'], 'angle': 10 ** 400}},
               bicep_model().controller().save(), None]
     for state in others:
         with pytest.raises(ParameterError, match='saved memory does not fit') as error:

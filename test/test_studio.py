@@ -158,6 +158,24 @@ def test_trials_of_one_recording_and_recordings_are_held_out(opened):
     assert 'unseen' not in one.errors() and '--trials' not in one.commands()[-1]
 
 
+def test_a_diagnosis_ends_with_the_rows_that_it_is_of(opened, monkeypatch):
+    one, found = opened(), object()
+    monkeypatch.setattr('hysteresis_ros.api.diagnose', lambda *args, **more: found)
+    one.diagnose()
+    one.hold_out(['trial 3'])
+    assert one.diagnosis is found
+    one.hold_out(['trial 2'])
+    assert one.diagnosis is None and 'diagnose' not in one.commands()[-1]
+
+    def diagnose_while_the_user_holds_out_another_trial(*args, **more):
+        one.hold_out(['trial 1'])
+        return found
+    monkeypatch.setattr('hysteresis_ros.api.diagnose',
+                        diagnose_while_the_user_holds_out_another_trial)
+    one.diagnose()
+    assert one.diagnosis is None
+
+
 def test_the_fit_is_that_of_extend_and_ends_with_a_move_of_a_slider(session):
     session.tick('payload_error')
     extension = session.fit()

@@ -222,13 +222,12 @@ class Controller:
         """
         before = self.save()
         try:
-            for part in (state['targets'], {'ambient': state['ambient'],
-                                            'supply': state.get('supply')}):
-                for name, value in part.items():
-                    if value is not None and not math.isfinite(value):
-                        raise ValueError(f'{name} is {value}')
+            for name in ('ambient', 'supply'):
+                value = state.get(name)
+                if value is not None and not math.isfinite(value):
+                    raise ValueError(f'{name} is {value}')
             self._take(state)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             self._take(before)
             raise ParameterError(f'saved memory does not fit the model ({error})') from None
 

@@ -47,7 +47,9 @@ class Targets:
         return {'angle': self._angle, 'direction': self._direction}
 
     def restore(self, angle: float | None, direction: float) -> None:
-        """Take back what `save` returned."""
+        """Take back what `save` returned; ValueError or TypeError if it is damaged."""
+        if not all(math.isfinite(value) for value in (angle or 0.0, direction)):
+            raise ValueError('a number of the targets is not finite')
         self._angle, self._direction = angle, direction
 
     def reference(self, theta: float) -> Reference:

@@ -162,6 +162,8 @@ class Session:
             unseen = [part for part in self.parts if part.name in names]
             if len(unseen) == len(self.parts):
                 raise ParameterError('something has to be fitted; leave one part of the data in')
+            if unseen != self.unseen:
+                self.diagnosis = None
             self.unseen, self.extension = unseen, None
             self._divide()
 
@@ -309,15 +311,17 @@ class Session:
         Returns
         -------
         Diagnosis
+            It is that of the session unless others became unseen meanwhile.
         """
         from hysteresis_ros import api
 
         with self._lock:
             self._require_recording()
-            train = self._train()
+            train, unseen = self._train(), self.unseen
         found = api.diagnose(self.model, train, progress=progress)
         with self._lock:
-            self.diagnosis = found
+            if [part.name for part in unseen] == [part.name for part in self.unseen]:
+                self.diagnosis = found
             self.version += 1
         return found
 
