@@ -167,12 +167,12 @@ def identify(length: Source | None = None, force: Source | None = None, *,
     IdentificationError
         If the tables do not suffice or do not fit together.
     ParameterError
-        If an effect is unknown, effects are wanted without a length table, or the arm is
-        impossible in its units.
+        If an effect is unknown, effects are wanted without a length table, the arm is impossible in
+        its units, or the lengths are no elongations of a muscle for it.
 
     """
     from hysteresis_ros.identification import bench
-    from hysteresis_ros.model.loads import check_loads
+    from hysteresis_ros.model.loads import check_lengths, check_loads
 
     tables = {name: None if source is None else bench_table(source, name)
               for name, source in (('length', length), ('force', force))}
@@ -184,6 +184,7 @@ def identify(length: Source | None = None, force: Source | None = None, *,
         tables['length'], tables['force'], force_trials=force_trials, length_trials=length_trials,
         geometry=None if geometry is None else _geometry(geometry), levels=levels,
         operator=operator, anchored=anchored)
+    check_lengths(found.model)
     check_loads(found.model)
     if names == [] or tables['length'] is None:
         return found

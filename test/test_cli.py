@@ -368,6 +368,8 @@ def test_a_bad_model_is_one_line(bench, tmp_path, capsys, text, words):
     (['identify', '--force', 'BENCH/length.csv', '-o', 'BENCH/x.yaml'], 'swapped'),
     (['identify', '--length', 'BENCH/length.csv', '--length-trials', '0,77', '-o',
       'BENCH/x.yaml'], 'trial 77'),
+    (['identify', '--length', 'BENCH/length.csv', '--effects', 'atuo', '-o', 'BENCH/x.yaml'],
+     "--effects atuo: did you mean 'auto'?"),
     (['identify', '--length', 'BENCH/length.csv', '--levels', '5', '101', '-o', 'BENCH/x.yaml'],
      'levels must be two numbers from 1 to 100, not [5, 101]'),
     (['invert', '--model', 'BENCH/model.yaml', '--reference', 'BENCH/geometry.yaml', '-o',

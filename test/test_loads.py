@@ -143,3 +143,16 @@ def test_an_arm_whose_loads_are_of_another_order_is_refused(names, factor):
     arm = {**GEOMETRY, **{name: factor * GEOMETRY[name] for name in names}}
     with pytest.raises(ParameterError, match='pulls each muscle with about .* is a mass in g'):
         api.identify(length, force, geometry=arm)
+
+
+@pytest.mark.parametrize('change, words', [
+    (lambda length: 0.27 + length, 'is no elongation of a muscle of 0.27 m'),
+    (lambda length: -length, 'a muscle that extends when driven')])
+def test_lengths_that_are_no_elongations_are_refused_for_an_arm(change, words):
+    """Total lengths, and contractions; a bench alone may count as it likes."""
+    length, force = tables()
+    wrong = Measurement.from_columns({
+        **length.columns, 'length': change(length.column('length'))})
+    with pytest.raises(ParameterError, match=words):
+        api.identify(wrong, force, geometry=GEOMETRY)
+    assert api.identify(wrong, force).model.geometry is None

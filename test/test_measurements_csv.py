@@ -107,6 +107,15 @@ def test_millimetres_are_refused_with_the_option_that_converts_them(written):
     assert list(read_measurement(path, columns='length=length:m').column('length')) == [-12, 2]
 
 
+def test_another_unit_than_that_of_the_header_is_said(written):
+    path = written('time,voltage,theta_deg\n0,0,91\n1,1,90\n')
+    with pytest.warns(MeasurementWarning, match="'theta_deg' is read in the unit that --columns"):
+        table = read_measurement(path, columns='angle=theta_deg:rad')
+    assert list(table.column('angle')) == [91, 90]
+    for columns in ('angle=theta_deg:deg', 'angle=theta_deg'):
+        assert read_measurement(path, columns=columns).warnings == ()
+
+
 @pytest.mark.parametrize('header, rows', [
     (HEADER.replace(',', ';'), ROWS.replace(',', ';')),
     (HEADER.replace(',', ';'), ROWS.replace(',', ';').replace('.', ',')),

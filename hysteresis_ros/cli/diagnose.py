@@ -5,16 +5,18 @@
 from __future__ import annotations
 
 import argparse
-
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
     add_data, add_json, add_model, add_report, add_settled, add_trials, divided, origin, processes,
-    read_all, say, seed, Subparsers, warn_of_loads, write_json)
+    read_all, say, seed, Subparsers, warn, warn_of_loads, write_json)
 from hysteresis_ros.cli.rounds import BENCH, Rounds
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.verdict import Diagnosis
+    from hysteresis_ros.measurements import Measurement
+    from hysteresis_ros.model import MuscleModel
 
 UNITS = {'angle': (57.29577951308232, 'deg'), 'length': (1e3, 'mm'), 'strain': (100.0, '%'),
          'force': (1.0, 'N')}
@@ -51,12 +53,22 @@ def run(args: argparse.Namespace) -> None:
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed, progress=rounds)
     rounds.close()
     warn_of_loads(model, measurements)
+    warn(without_bench_effects(model, measurements))
     say(args, to_text(found, measurements[-1].response))
     if args.json:
         write_json(args.json, found.to_dict())
     if args.report:
         from hysteresis_ros.report.diagnosis_page import write_diagnosis
         write_diagnosis(args.report, model, measurements, found, args.model, origin(args))
+
+
+def without_bench_effects(model: MuscleModel, measurements: Sequence[Measurement]) -> str:
+    """Say that a model lacks what its bench could have told, '' if it does not."""
+    loads = model.provenance.get('length', {}).get('loads', ())
+    if model.effects or len(set(loads)) < 2 or measurements[0].response != 'angle':
+        return ''
+    return ('the model has no effects, and what its bench lacks may be taken for something of the '
+            'arm; first identify it with --effects auto')
 
 
 def to_text(found: Diagnosis, response: str) -> str:

@@ -14,6 +14,7 @@ from hysteresis_ros.cli.common import (
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.cli.rounds import BENCH, Rounds
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.spelling import closest
 
 if TYPE_CHECKING:
     from hysteresis_ros.identification.bench import Identified
@@ -63,6 +64,9 @@ def run(args: argparse.Namespace) -> None:
 
     if args.force is None and args.length is None:
         raise ParameterError('nothing to identify; give --length, --force or both')
+    meant = closest(args.effects, ('auto', 'none'))
+    if meant not in (None, args.effects):
+        raise ParameterError(f'--effects {args.effects}: did you mean {meant!r}?')
     if args.effects == 'auto':
         say(args, AUTO)
     steps, rounds = Steps(), Rounds(BENCH)
@@ -76,11 +80,22 @@ def run(args: argparse.Namespace) -> None:
     steps.clear()
     found.model.save(args.output)
     say(args, report(found))
+    for name in worse_than_a_line(found):
+        warn(f'{name}: the model is worse than a straight line; check sign and unit of the columns '
+             'and the trials')
     if found.model.geometry is not None and found.model.response == 'length':
         warn(load_in_words(found.model, reached_angles(found.model)))
     say(args, f'\nWritten to {args.output}')
     if args.json:
         write_json(args.json, {'model': args.output, **found.to_dict()})
+
+
+def worse_than_a_line(found: Identified) -> list[str]:
+    """Return the rows of Table I in which the linear model has the smaller error."""
+    rows = [(f'{name}, {part}', values) for name, parts in found.model.metrics.items()
+            for part, values in parts.items() if isinstance(values, dict) and 'linear' in values]
+    return [name for name, values in rows
+            if values['model']['mean_percent'] > values['linear']['mean_percent']]
 
 
 def report(found: Identified) -> str:

@@ -171,8 +171,18 @@ def extend(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement
     warnings = _unobservable(model, names, train, force)
     problem, classes, fits = _fitted(model, names, train)
     warnings += [note for effect in fits[-1][0] for note in undetermined(effect, problem.kind)]
+    if not _trials(train).isdisjoint(_trials(test)):
+        warnings.append('trials of the test are among those that are fitted: what is said of data '
+                        'not fitted does not hold for them')
     stages = [(f'+ {kind.id}', effects) for kind, (effects, _) in zip(classes, fits)]
     return _gained(model, problem, stages, train, test, fits[-1][1], warnings)
+
+
+def _trials(recordings: Iterable[Measurement]) -> set[tuple[bytes, ...]]:
+    """Return what tells one trial from another: its measured values and its drive."""
+    return {tuple(one.column(name)[one.column('trial') == trial].tobytes()
+                  for name in (one.response, one.drive))
+            for one in recordings for trial in one.trials}
 
 
 @one_blas_thread()

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hysteresis_ros.measurements.columns import Column
+from hysteresis_ros.measurements.columns import Column, unit_in_header
 from hysteresis_ros.measurements.quantities import QUANTITIES
 from hysteresis_ros.measurements.units import likely_unit, SAME
 import numpy as np
@@ -66,8 +66,11 @@ def unit_problems(largest: Mapping[str, float],
 
 def unit_warnings(largest: Mapping[str, float],
                   origin: Mapping[str, Column] | None = None) -> list[str]:
-    """Return what is smaller, or takes longer, than expected, one clause each."""
-    found = []
+    """Return what is smaller, takes longer or has another unit than expected, one clause each."""
+    found = [f'{column.header!r} is read in the unit that --columns names, not in the one of its '
+             'name; check which is right' for column in (origin or {}).values()
+             if column.confirmed
+             and unit_in_header(column.name, column.header) not in (None, column.unit)]
     for name, value in largest.items():
         if confirmed(name, origin):
             continue

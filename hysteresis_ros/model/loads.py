@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the bench has shown the muscle under the loads that an arm puts on it."""
+"""Whether the bench has shown a muscle for an arm, under the loads that the arm puts on it."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 MARGIN = 0.02
 # Two neighbouring loads of the bench are far apart if every other gap is smaller by this factor.
 WIDE = 1.5
+# No muscle lengthens or shortens by this share of its resting length: a braided one, which does so
+# the most, by a third.
+LARGEST_STRAIN = 0.5
 # A load this many times beyond the bench's comes from a value in another unit.
 FAR_BEYOND = 10.0
 
@@ -66,6 +69,29 @@ def uncovered_load(model: MuscleModel, theta: np.ndarray) -> (
     wide = gaps[widest] > WIDE * np.max(np.delete(gaps, widest))
     inside = arm[0] < above - margin and arm[1] > below + margin
     return (arm, (below, above), True) if wide and inside else None
+
+
+def check_lengths(model: MuscleModel) -> None:
+    """
+    Refuse lengths that are no elongations of a muscle that contracts.
+
+    Raises
+    ------
+    ParameterError
+        If an arm is known and the lengths are larger than any elongation of its muscle, or rise
+        with the drive.
+    """
+    if model.geometry is None or model.response != 'length' or 'length' not in model.ranges:
+        return
+    rest, largest = model.geometry.resting_length, max(map(abs, model.ranges['length']))
+    if largest > LARGEST_STRAIN * rest:
+        raise ParameterError(
+            f'the length table reaches {largest:.4g} m, which is no elongation of a muscle of '
+            f'{rest:.4g} m; give the length less the resting length, or check its unit')
+    if model.sign > 0:
+        raise ParameterError(
+            'the length table is of a muscle that extends when driven, and the arm needs one that '
+            'contracts; give its elongation, which is negative while it is shorter than at rest')
 
 
 def check_loads(model: MuscleModel) -> None:
