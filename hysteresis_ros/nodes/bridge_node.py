@@ -327,7 +327,8 @@ class BridgeNode(ManagedNode):
     def _look(self) -> None:
         if not self.context.ok():
             return
-        self._tell('lifecycle', OK, '' if self._works else f'the node is {self.state}')
+        self._tell('lifecycle', OK, '' if self._works else f'the node is {self.state}',
+                   'active: publishing measurements and taking setpoints')
         board = self._board
         if board is None:
             for name in ('board', 'faults', 'supply', 'timeout', 'encoder', 'fault', 'output',
@@ -367,7 +368,9 @@ class BridgeNode(ManagedNode):
             self._diagnostics.set('board', OK, f'looking for the board at '
                                   f'{self._settings["port"]}')
         else:
-            self._tell('board', ERROR, status.problem)
+            found = status.identity.name if status.identity else 'a board'
+            self._tell('board', ERROR, status.problem,
+                       f'the board at {self._settings["port"]} is there: {found}')
         self._tell('faults', ERROR, status.faults if status.online else '')
         self._tell('supply', ERROR, status.limit)
         self._tell('timeout', WARN, 'no setpoint for setpoint_timeout '
@@ -394,11 +397,11 @@ class BridgeNode(ManagedNode):
         elif now - since > BAD_LINES_SHOWN_FOR:
             self._diagnostics.clear('lines')
 
-    def _tell(self, name: str, level: bytes, sentence: str) -> None:
+    def _tell(self, name: str, level: bytes, sentence: str, instead: str = '') -> None:
         if sentence:
             self._diagnostics.set(name, level, sentence)
         else:
-            self._diagnostics.clear(name)
+            self._diagnostics.clear(name, instead)
 
     def _values(self) -> dict[str, Any]:
         values: dict[str, Any] = {

@@ -169,7 +169,7 @@ class CompensatorNode(ManagedNode):
         if state:
             self._diagnostics.set('lifecycle', OK, f'the node is {state}')
         else:
-            self._diagnostics.clear('lifecycle')
+            self._diagnostics.clear('lifecycle', 'active: following references')
 
     def _repeat_every(self, period: float) -> None:
         """Look for silence twice in a period [s]; 0 for never."""

@@ -64,11 +64,19 @@ class Diagnostics:
         if changed:
             self.publish()
 
-    def clear(self, name: str) -> None:
-        """Drop condition `name`; nothing happens when it does not hold."""
+    def clear(self, name: str, instead: str = '') -> None:
+        """
+        Drop condition `name`; nothing happens when it does not hold.
+
+        Parameters
+        ----------
+        name : str
+        instead : str
+            What holds now, for the log; by default that the sentence does no longer.
+        """
         condition = self._conditions.pop(name, None)
         if condition is not None:
-            self._log(name, OK, f'no longer: {condition[1]}', True)
+            self._log(name, OK, instead or f'no longer: {condition[1]}', True)
             self.publish()
 
     def publish(self) -> None:

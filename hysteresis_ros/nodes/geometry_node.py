@@ -99,6 +99,7 @@ class GeometryNode(Node):
         self._timer = self.create_timer(1.0 / parameters['trajectory_rate'], self._go_on)
         self._timer.cancel()
         promise_life(self)
+        self.get_logger().info('waiting for target angles')
 
     def on_shutdown(self) -> None:
         """Let the muscle go if somebody was moving it: nobody will take it to the end."""

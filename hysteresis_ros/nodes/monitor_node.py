@@ -184,7 +184,7 @@ class MonitorNode(Node):
             self._fine_until = now
             # Half the limit: a residual near it is not to come and go with each sample.
             if abs(self._residual) <= 0.5 * limit:
-                self._diagnostics.clear('residual')
+                self._diagnostics.clear('residual', 'the arm is near the model again')
         elif now - self._fine_until >= time:
             self._diagnostics.set('residual', WARN, (
                 f'the arm has been more than {limit:g} rad off the model for {time:g} s, now '

@@ -37,7 +37,7 @@ def load_model(path: str, values: Mapping, logger: RcutilsLogger) -> MuscleModel
     values : mapping
         The node's parameters, with the geometry.
     logger : rclpy logger
-        Warned if the model was identified with another arm.
+        Told which model it is, and warned if it was identified with another arm.
 
     Returns
     -------
@@ -46,13 +46,15 @@ def load_model(path: str, values: Mapping, logger: RcutilsLogger) -> MuscleModel
     Raises
     ------
     ModelFileError
-        If it is no model file of this version, or not of a muscle that lifts an arm by voltage.
-    OSError
-        If it cannot be read.
+        If it cannot be read, is no model file of this version, or not of a muscle that lifts an arm
+        by voltage.
     """
     from hysteresis_ros.model import MuscleModel   # SciPy: not needed without a model
     path = path or str(share_path('config/bicep_model.yaml'))
-    model = MuscleModel.load(path)
+    try:
+        model = MuscleModel.load(path)
+    except OSError as error:
+        raise ModelFileError(f'model_file: {path} cannot be read ({error.strerror})') from None
     if model.drive != 'voltage' or model.length_stage is None:
         raise ModelFileError(f'{path}: the nodes need a model from voltage to length; identify one '
                              'with --length')
@@ -63,6 +65,8 @@ def load_model(path: str, values: Mapping, logger: RcutilsLogger) -> MuscleModel
         if abs(other - getattr(geometry, name)) > 1e-9]
     if others:
         logger.warning(f'{path} is of another arm ({", ".join(others)}); the parameters count')
+    effects = ', '.join(effect.id for effect in model.effects) or 'no effects'
+    logger.info(f'model: {path} with {effects}')
     return dataclasses.replace(model, geometry=geometry)
 
 
