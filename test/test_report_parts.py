@@ -78,7 +78,7 @@ def test_no_probability_is_said_to_be_certain(value, words):
     # The sets say nothing of it: effects by themselves do, the best first and why it lost.
     ({**ALONE, 'ranking': [row('payload_error', 0.002), row('slack', 0.03),
                            row('clamp_mass', 0.0021, plausible=False)]},
-     ['with clamp_mass the RMSE is 0.120 deg', 'outside its physical range', 'with slack the']),
+     ['With clamp_mass the RMSE is 0.120 deg', 'outside its physical range', 'With slack the']),
     ({**ALONE, 'ranking': [row('payload_error', 0.002)]}, []),
     ({'verdict': 'adequate', 'missing': [], 'alternatives': [],
       'sets': weighed(([], 0.95, 0.01)), 'ranking': [row('slack', 0.079)]},

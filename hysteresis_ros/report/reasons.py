@@ -102,9 +102,9 @@ def _alone(found: Diagnosis, row: dict[str, Any], quantity: str) -> str:
     if found.verdict == 'missing':
         errors = _errors(row['rmse_after'], found.rmse_after, quantity)
         if not row['plausible']:
-            return (f'with {name} the {found.error_name} is {errors}, but only with values outside '
+            return (f'With {name} the {found.error_name} is {errors}, but only with values outside '
                     'its physical range.')
-        return f'with {name} the {found.error_name} is {errors}.'
+        return f'With {name} the {found.error_name} is {errors}.'
     text = (f'{name} comes next: it takes {100.0 * row["gain"]:.0f} % off the '
             f'{error_in_words(found)} on rows not fitted '
             f'(p {found.p_value(row)})')

@@ -147,13 +147,14 @@ def signals(comparison: Comparison) -> dict[str, Any]:
     block = blocks_of(residual, comparison.trial)
     some = some_rows(comparison.rows, MOST_DOTS)
     found = []
-    spread = float(np.quantile(np.abs(residual), 0.995))
+    # Intervals of few independent rows would press the rows themselves flat; they are cut.
+    largest = 1.5 * float(np.quantile(np.abs(residual), 0.995))
     ends_y = [0.0, *np.quantile(residual, [0.005, 0.995])]
     for name, values in comparison.signals.items():
         bins = binned(name, values, residual, block)
         half = np.where(np.isfinite(bins.half), bins.half, np.nan)
         for sign in (-1.0, 1.0):
-            ends_y += list(np.clip(bins.mean + sign * np.nan_to_num(half), -3 * spread, 3 * spread))
+            ends_y += list(np.clip(bins.mean + sign * np.nan_to_num(half), -largest, largest))
         low, high = np.quantile(values, [0.005, 0.995])
         ends = np.array([values.min(), values.max()])
         if np.ptp(values) > 3 * (high - low) > 0:

@@ -64,7 +64,7 @@ class Loop extends Chart {
     shape(group, 'text', {x: left + COLOURS * size + 5, y: 14},
       `${signed(limit)} ${response.unit}`);
     if (this.width > 560) {
-      shape(group, 'text', {x: 2, y: 14}, `colour: residual of ${predictions[main].name}`);
+      shape(group, 'text', {x: 2, y: 14}, `colour: residual, ${predictions[main].name}`);
     }
   }
 
