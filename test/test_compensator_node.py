@@ -226,7 +226,9 @@ def test_model_file_is_loaded_and_the_arm_of_the_parameters_counts(graph, tmp_pa
 
 @pytest.mark.parametrize('change, words', [
     ({'drive': 'pressure'}, 'from voltage to length'),
-    ({'length_stage': None}, 'from voltage to length')])
+    ({'length_stage': None}, 'from voltage to length'),
+    ({'sign': 1}, 'extends when driven'),
+    ({'ranges': {'length': (0.26, 0.275)}}, 'no elongation of a muscle of 0.27 m')])
 def test_model_of_another_muscle_is_refused_at_start(graph, tmp_path, change, words):
     """Not only when the first reference comes."""
     path = tmp_path / 'model.yaml'

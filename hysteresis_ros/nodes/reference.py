@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from sensor_msgs.msg import JointState
 
 from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
-from hysteresis_ros.errors import ModelFileError, RangeError
+from hysteresis_ros.errors import ModelFileError, ParameterError, RangeError
 from hysteresis_ros.share import share_path
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def load_model(path: str, values: Mapping, logger: RcutilsLogger) -> MuscleModel
         by voltage.
     """
     from hysteresis_ros.model import MuscleModel   # SciPy: not needed without a model
+    from hysteresis_ros.model.loads import check_lengths
     path = path or str(share_path('config/bicep_model.yaml'))
     try:
         model = MuscleModel.load(path)
@@ -67,7 +68,12 @@ def load_model(path: str, values: Mapping, logger: RcutilsLogger) -> MuscleModel
         logger.warning(f'{path} is of another arm ({", ".join(others)}); the parameters count')
     effects = ', '.join(effect.id for effect in model.effects) or 'no effects'
     logger.info(f'model: {path} with {effects}')
-    return dataclasses.replace(model, geometry=geometry)
+    model = dataclasses.replace(model, geometry=geometry)
+    try:
+        check_lengths(model)
+    except ParameterError as error:
+        raise ModelFileError(f'{path}: {error}') from None
+    return model
 
 
 def needs_ambient(model: MuscleModel) -> bool:
