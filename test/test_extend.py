@@ -230,9 +230,15 @@ def test_the_command_says_the_gain_and_writes_model_json_and_page(
     assert len(MuscleModel.load(tmp_path / 'new.yaml').effects) == 2
     assert 'unseen recording' in (tmp_path / 'r.html').read_text(encoding='utf-8')
 
+    assert main(command) == 0
+    assert 'warning' not in capsys.readouterr().err
     command[8] = command[6]
     assert main(command) == 0
     assert 'trials of the test are among those that are fitted' in capsys.readouterr().err
+    command[2:5] = [str(tmp_path / 'new.yaml'), '--add', 'frame_tilt']
+    assert main(command[:-1] + [str(tmp_path / 'newer.yaml')]) == 0
+    assert 'frame_tilt takes less than 5 % off the error' in capsys.readouterr().err
+    command[2] = str(tmp_path / 'model.yaml')
     command[4] = 'gremlins'
     assert main(command) == 1
     error = capsys.readouterr().err

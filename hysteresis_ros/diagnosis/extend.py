@@ -175,7 +175,13 @@ def extend(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement
         warnings.append('trials of the test are among those that are fitted: what is said of data '
                         'not fitted does not hold for them')
     stages = [(f'+ {kind.id}', effects) for kind, (effects, _) in zip(classes, fits)]
-    return _gained(model, problem, stages, train, test, fits[-1][1], warnings)
+    found = _gained(model, problem, stages, train, test, fits[-1][1], warnings)
+    practical = Settings().practical
+    if found.steps[-1][1] > (1.0 - practical) * found.steps[0][1]:
+        found.warnings.append(
+            f'{", ".join(names)} takes less than {100.0 * practical:.0f} % off the error: nothing '
+            'of the kind acts here, or the model has it already')
+    return found
 
 
 def _trials(recordings: Iterable[Measurement]) -> set[tuple[bytes, ...]]:
