@@ -90,7 +90,7 @@ class _Verdict:
         return verdict.Diagnosis(
             verdict=kind, missing=missing,
             alternatives=[alternatives[name] for name in missing],
-            ranking=self._ranking(missing, before), sets=self._sets(shares, unknown),
+            ranking=self._ranking(missing, before), sets=self._sets(shares),
             noise_floor=self.sets.fits[chosen].noise,
             structural_error=selection.covariance.size,
             unexplained=self._unexplained(chosen),
@@ -136,7 +136,7 @@ class _Verdict:
         return {**{names: value / total for names, value in known.items()},
                 'unknown': unknown / total}
 
-    def _sets(self, shares: dict[frozenset[str], float], unknown: bool) -> list[dict[str, Any]]:
+    def _sets(self, shares: dict[frozenset[str], float]) -> list[dict[str, Any]]:
         rows: list[dict[str, Any]] = [
             {'effects': sorted(names), 'probability': float(share),
              'rmse': self.sets.error(names)}
@@ -171,7 +171,7 @@ class _Verdict:
             return found
         best = self.sets.log_posterior(chosen)
         least = best + math.log(self.settings.reported)
-        for names in self.sets.valid():
+        for names in valid:
             if (names == chosen or len(names) != len(chosen)
                     or self.sets.log_posterior(names) < least
                     or not self.sets.sufficient(names)):

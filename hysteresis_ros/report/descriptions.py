@@ -39,13 +39,13 @@ def descriptions(comparison: Comparison, after: Comparison | None = None) -> dic
              'since_step': f'Residual against the time since the last step. {_since(comparison)}',
              'correlogram': _correlogram(comparison),
              'coverage': 'How often each value was met. ' + '; '.join(
-                 _range(comparison, name, values) for name, values in (
+                 _range(name, values) for name, values in (
                      (comparison.drive, comparison.signals.get(comparison.drive)),
                      (comparison.quantity, comparison.measured)) if values is not None) + '.'}
     return found
 
 
-def _range(comparison: Comparison, name: str, values: np.ndarray) -> str:
+def _range(name: str, values: np.ndarray) -> str:
     text, unit, scale = label(name)
     low, high = number(scale * float(values.min())), number(scale * float(values.max()))
     return f'{text} from {low} to {high} {unit}'.rstrip()
@@ -57,7 +57,7 @@ def _overlay(comparison: Comparison, after: Comparison | None) -> str:
     worst = int(np.argmax(np.abs(residual)))
     x, name = along(comparison)
     runs, _, x_unit = name.partition(' [')
-    text = (f'{_range(comparison, comparison.quantity, comparison.measured)} over {runs}, in '
+    text = (f'{_range(comparison.quantity, comparison.measured)} over {runs}, in '
             f'{len(comparison.by_trial)} trials, measured and predicted, with the residual below. '
             f'The model is off by {number(scale * comparison.model.mean_abs)} {unit} on average')
     if after is not None:
