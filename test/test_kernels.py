@@ -27,10 +27,12 @@ ARMS = [(), ('coulomb_friction',), ('viscous_friction', 'coulomb_friction'),
 EVERYTHING = """
 import sys
 import numpy as np
+from scipy import sparse
 sys.path.insert(0, {tests!r})
 from hysteresis_ros.model import Simulator
+from hysteresis_ros.identification.nonnegative import solve_rows
 from hysteresis_ros.operators import (
-    Linear, Preisach, PrandtlIshlinskii, signed_areas, signed_lengths)
+    BoucWen, Linear, Preisach, PrandtlIshlinskii, signed_areas, signed_lengths)
 from model_support import arm_run, bicep_model, effect_of, STRENGTHS, wandering_voltage
 import numba
 assert numba.config.DISABLE_JIT == {disabled!r}
@@ -41,13 +43,15 @@ found = [signed_areas(nodes, rng.uniform(0.0, 6.0, 50)).ravel(),
          signed_lengths(nodes, rng.uniform(0.0, 6.0, 9)).ravel()]
 operators = [Preisach(nodes, rng.uniform(0.0, 1.0, 15), 0.3, rng.uniform(0.0, 1.0, 5)),
              PrandtlIshlinskii([0.0, 0.5, 1.0], [1.0, 0.5, 0.2], 0.1, 0.0, 6.0, [2.0], [-0.5]),
-             Linear(2.0, 1.0, 0.0, 6.0)]
+             BoucWen(1.0, 2.0, 1.5, 0.5, 2.3, 0.1, 0.0, 6.0), Linear(2.0, 1.0, 0.0, 6.0)]
 for operator in operators:
     found.append(operator.simulate(rng.uniform(-1.0, 7.0, 200)))
     low, high = operator.output_range
     for y in rng.uniform(low, high, 100):
         u = operator.invert(y).input
         found.append([u, operator.peek(7.0 - u), operator.step(u)])
+found.append(solve_rows(rng.random((20, 40)), rng.random(20), 1e-3 * sparse.identity(
+    40, format='csr'), np.arange(40) == 39)[0])
 arm = arm_run(wandering_voltage(40, seed=1), 0.1)
 model = bicep_model()
 simulator = Simulator(model, arm)
