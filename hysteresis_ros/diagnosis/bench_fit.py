@@ -230,7 +230,7 @@ class BenchFitter:
         inverse = np.linalg.pinv(normal, rcond=1e-10)
         # What the rows do not determine at all has no end, instead of no width.
         free = 1.0 - np.diag(inverse @ normal) > 0.5
-        free |= size <= UNDETERMINED * float(np.std(self.problem.measured)) * np.sqrt(len(error))
+        free |= ~self._moves(jacobian)
         inverse = inverse / np.outer(size, size)
         scores = np.stack([jacobian[rows].T @ error[rows] for rows in (
             self.problem.block == block for block in np.unique(self.problem.block))])
@@ -241,3 +241,14 @@ class BenchFitter:
             np.maximum(np.diag(covariance), 0.0))
         half[free] = np.inf
         return parameters.with_intervals(fit.vector, half)
+
+    def parameters_in_use(self, fit: Fit) -> int:
+        """Return how many parameters of a fit the response depends on; a form may be idle alone."""
+        jacobian = Response(self.problem, self.fixed, fit.effects).jacobian(fit.vector)
+        return int(np.count_nonzero(self._moves(jacobian)))
+
+    def _moves(self, jacobian: np.ndarray) -> np.ndarray:
+        """Return whether each column of a Jacobian (n, k) moves the response at all."""
+        spread = float(np.std(self.problem.measured)) * np.sqrt(len(jacobian))
+        moves: np.ndarray = ~(np.linalg.norm(jacobian, axis=0) <= UNDETERMINED * spread)
+        return moves

@@ -91,6 +91,7 @@ class BenchSelection:
         self.sets: list[Fit] = []
         self.tried: list[Fit] = []
         self.p_values: dict[tuple[str, ...], float] = {}
+        self._counts: dict[int, tuple[Fit, int]] = {}
 
     def run(self) -> None:
         """Fit every effect by itself, grow sets from the best, and compare what they predict."""
@@ -105,14 +106,29 @@ class BenchSelection:
                      and (value <= SIGNIFICANCE or self._log_odds(fit, self.base) > 0.0)]
         if not self.sets:
             return
-        best = min(map(self.typical_error, self.sets))
-        near_best = [fit for fit in self.sets
-                     if self.typical_error(fit) <= (1.0 + self.settings.practical) * best]
-        # Of those that predict loads held out alike, the most probable by the rows fitted.
-        self.found = max(near_best, key=lambda fit: self._fitted_log_odds(fit, self.base))
+        self._choose()
         while (self._leave_out_chance() or self._leave_out_unstable()
                or self._leave_out_undetermined()):
             pass
+
+    def _choose(self) -> None:
+        """
+        Take the most probable set of those whose sizes the rows determine, if there are any.
+
+        Two effects that stand for each other are vague together; alone each competes.
+        """
+        self.found = self._most_probable(self.sets)
+        determined = [fit for fit in self.sets if self._determines(fit)]
+        if determined:
+            vague, self.found = self._notes(self.found), self._most_probable(determined)
+            self.unstable.update({name: _cannot_be_determined(name, note)
+                                  for name, note in vague.items() if name not in self.found.names})
+
+    def _most_probable(self, fits: Sequence[Fit]) -> Fit:
+        """Of those that predict loads held out alike, return the most probable by rows fitted."""
+        largest = (1.0 + self.settings.practical) * min(map(self.typical_error, fits))
+        return max((fit for fit in fits if self.typical_error(fit) <= largest),
+                   key=lambda fit: self._fitted_log_odds(fit, self.base))
 
     def _begun_where_larger_ended(self, fits: Sequence[Fit]) -> list[Fit]:
         """
@@ -270,23 +286,26 @@ class BenchSelection:
 
     def _leave_out_undetermined(self) -> bool:
         """Leave out the effect whose size the rows do not determine and that is missed least."""
-        notes = {effect.id: not_determined(effect, self.problem.kind)
-                 for effect in self.fitter.with_intervals(self.found)}
-        without = {name: self._best_without(name) for name, note in notes.items() if note}
-        if not without:
+        notes = self._notes(self.found)
+        if not notes:
             return False
+        without = {name: self._best_without(name) for name in notes}
         name = min(without, key=lambda one: self.typical_error(without[one]))
-        self._leave_out(name, str(notes[name]), without[name])
+        self._leave_out(name, notes[name], without[name])
         return True
+
+    def _notes(self, fit: Fit) -> dict[str, str]:
+        """Return why the rows do not determine the size of an effect, of those of a fit."""
+        notes = {effect.id: not_determined(effect, self.problem.kind)
+                 for effect in self.fitter.with_intervals(fit)}
+        return {name: note for name, note in notes.items() if note}
 
     def _determines(self, fit: Fit) -> bool:
         """Whether the rows determine the size of each effect of a fit."""
-        return not any(not_determined(effect, self.problem.kind)
-                       for effect in self.fitter.with_intervals(fit))
+        return not self._notes(fit)
 
     def _leave_out(self, name: str, reason: str, instead: Fit) -> None:
-        experiment = catalogue()[name].experiment
-        self.unstable[name] = f'cannot be determined here: {reason}; it would be by: {experiment}'
+        self.unstable[name] = _cannot_be_determined(name, reason)
         self.found = instead
 
     def _best_without(self, name: str) -> Fit:
@@ -303,10 +322,10 @@ class BenchSelection:
                      and self._determines(fit)), self.base)
 
     def _named_again(self, other: Fit) -> float:
-        """Return the share of folds that the set found predicts better than another one."""
-        squares = [np.bincount(self.problem.fold, weights=(
-            self.problem.measured - fit.held_out) ** 2) for fit in (self.found, other)]
-        return float(np.mean(squares[0] < squares[1]))
+        """Return the share of folds that the set found predicts no worse than another one."""
+        own, others = (np.sqrt(self._squares(fit.held_out) + self.small_error() ** 2)
+                       for fit in (self.found, other))
+        return float(np.mean(own <= (1.0 + self.settings.practical) * others))
 
     def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None], fitter: BenchFitter,
                      items: Sequence) -> list[Fit]:
@@ -374,7 +393,13 @@ class BenchSelection:
         prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
         before, after = (self._typical(one.predicted, self.problem.noise) for one in (base, fit))
         return (prior * (len(fit.effects) - len(base.effects)) + significance.schwarz_log_odds(
-            before, after, count, len(fit.vector) - len(base.vector)))
+            before, after, count, self._parameters(fit) - self._parameters(base)))
+
+    def _parameters(self, fit: Fit) -> int:
+        """Return how many parameters of a fit the response depends on."""
+        if id(fit) not in self._counts:
+            self._counts[id(fit)] = fit, self.fitter.parameters_in_use(fit)
+        return self._counts[id(fit)][1]
 
     def _gains(self, fit: Fit, base: Fit) -> np.ndarray:
         """
@@ -437,6 +462,12 @@ class BenchSelection:
         logs = np.array([self._log_odds(fit, self.base) for fit in fits])
         weights = np.exp(logs - logs.max())
         return list(zip(fits, (weights / weights.sum()).tolist()))
+
+
+def _cannot_be_determined(name: str, reason: str) -> str:
+    """Say why the size of an effect is not known, and what would show it."""
+    return (f'cannot be determined here: {reason}; it would be by: '
+            f'{catalogue()[name].experiment}')
 
 
 def _but_one_universal(fit: Fit) -> bool:
