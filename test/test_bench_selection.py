@@ -63,6 +63,39 @@ def test_what_was_left_out_does_not_come_back(selection, monkeypatch):
     selection.sets, selection.unstable = [], {}
 
 
+def of_share(selection, names, held_out, fitted):
+    """Return a fit with some effects and shares of the base's errors, held out and fitted."""
+    base, measured = selection.base, selection.problem.measured
+    return dataclasses.replace(
+        base, effects=[catalogue()[name]() for name in names],
+        held_out=measured + held_out * (base.held_out - measured),
+        predicted=measured + fitted * (base.predicted - measured))
+
+
+def test_of_two_effects_that_stand_for_each_other_each_alone_competes(selection, monkeypatch):
+    """Which of them is vague in the set of both says nothing of which it is."""
+    sets = [of_share(selection, *one) for one in (
+        (('slack', 'fatigue'), 0.1, 0.1), (('fatigue',), 0.3, 0.2), (('slack',), 0.3, 0.3))]
+    monkeypatch.setattr(selection, '_notes', lambda fit: (
+        {'fatigue': 'vague'} if fit is sets[0] else {}))
+    with monkeypatch.context() as patched:
+        patched.setattr(selection, 'sets', sets)
+        patched.setattr(selection, 'unstable', {})
+        patched.setattr(selection, 'found', selection.base)
+        selection._choose()
+        assert selection.found is sets[1] and selection.unstable == {}
+        selection.sets = [sets[0], sets[2]]
+        selection._choose()
+        assert selection.found is sets[2]
+        assert selection.unstable['fatigue'].startswith('cannot be determined here: vague; it')
+
+
+def test_a_load_predicted_nearly_as_well_is_no_argument_against_an_effect(selection, monkeypatch):
+    for share, named in ((1.03, 1.0), (1.4, 0.0)):
+        monkeypatch.setattr(selection, 'found', of_share(selection, ('slack',), share, 1.0))
+        assert selection._named_again(selection.base) == named
+
+
 def test_every_load_counts_alike_whatever_its_error(selection):
     """The geometric mean of the errors on four loads; what is below the floor is no less."""
     errors = np.array([1e-3, 2e-3, 4e-3, 8e-3])

@@ -100,6 +100,22 @@ def test_a_form_that_comes_out_as_the_simplest_is_free_no_longer():
     assert np.all(np.isfinite(fitter.cross_validate(fit).held_out))
 
 
+def test_a_form_that_does_nothing_beside_the_others_is_not_counted():
+    """The shift follows a strain that grows with the load, if there is one."""
+    force, length = (Measurement.from_columns(bench_tables({}, 20)[f'{name}.csv'])
+                     for name in ('force', 'length'))
+    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY),
+                     length_trials=range(4), force_trials=[0]).model
+    problem = problem_for(model, [length.select(range(4))])
+    fitter, shift = BenchFitter(problem), effect_of(model, 'stress_dependence', C=0.5, follows=0.5)
+    strain = effect_of(model, 'stress_dependent_strain', r=0.5)
+    for effects, count in (([shift], 1), ([shift, strain], 4)):
+        response = Response(problem, [], effects)
+        fit = response.fit(response.parameters.vector())
+        assert len(fit.vector) == (4 if strain in effects else 2)
+        assert fitter.parameters_in_use(fit) == count
+
+
 def on_bench(muscle):
     """Return the effects of the load as fitted to a bench with a wire, and its metrics."""
     tables = bench_tables({}, 20, muscle)
