@@ -61,7 +61,7 @@ def invert(model: MuscleModel, reference: Mapping[str, np.ndarray],
     Parameters
     ----------
     model : MuscleModel
-    reference : dict of str to ndarray (rows,)
+    reference : dict of str to ndarray, shape (rows,)
         As `read_reference` gives it: force at resting length [N], or load and length, or angle
         [rad]; `trial` wipes the memory where it changes; `time`, `ambient_temperature` and
         `supply_voltage` are used if they are there.
@@ -69,9 +69,9 @@ def invert(model: MuscleModel, reference: Mapping[str, np.ndarray],
 
     Returns
     -------
-    drive : ndarray of float64 (rows,)
+    drive : ndarray of float64, shape (rows,)
         In the unit of the model's drive, within the range it was identified on.
-    saturated : ndarray of bool (rows,)
+    saturated : ndarray of bool, shape (rows,)
         Where the reference is out of reach; the nearest drive is given, and the last one again
         where even the linkage cannot take the angle.
 

@@ -55,15 +55,15 @@ class Comparison(Result):
         RMSE of the noise of the recording alone; no model has less.
     warnings : list of str
         What looked wrong in the recordings.
-    measured, predicted, linear_predicted : ndarray of float64 (rows,)
+    measured, predicted, linear_predicted : ndarray of float64, shape (rows,)
         In the unit above; the last one None without a linear model.
-    trial : ndarray of int (rows,)
+    trial : ndarray of int, shape (rows,)
         Trials of all recordings, counted from 0.
-    time : ndarray of float64 (rows,) or None
+    time : ndarray of float64, shape (rows,), or None
         Time since the first recording began, the recordings one after the other.
     drive, load : str, str or None
         Names of the signals.
-    signals : dict of str to ndarray (rows,)
+    signals : dict of str to ndarray, shape (rows,)
         Those that every recording has.
     continuous : bool
         Whether any recording is.

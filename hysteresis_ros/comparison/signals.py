@@ -36,7 +36,7 @@ def signals_of(measurement: Measurement, predicted: np.ndarray,
     Parameters
     ----------
     measurement : Measurement
-    predicted : ndarray, (rows,)
+    predicted : ndarray, shape (rows,)
         The model's response; used instead of the measured one, whose noise is in the residual.
     geometry : BicepGeometry, optional
         Gives the muscle's force in an arm run.
@@ -89,7 +89,7 @@ def varies(values: np.ndarray, recorded: str = '') -> bool:
 
     Parameters
     ----------
-    values : ndarray, (rows,)
+    values : ndarray, shape (rows,)
     recorded : str
         Name of a signal that has noise of its own, such as the temperature of the air; others
         change if they change by more than rounding.
@@ -111,9 +111,9 @@ def changes(measurement: Measurement) -> tuple[np.ndarray, np.ndarray]:
 
     Returns
     -------
-    last : ndarray of int (rows,)
+    last : ndarray of int, shape (rows,)
         Row at which the drive last left the dead band, the trial's first row before that.
-    jump : ndarray of float64 (rows,)
+    jump : ndarray of float64, shape (rows,)
         By how much it had changed then, 0 before any change.
 
     """

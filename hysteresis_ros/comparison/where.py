@@ -107,13 +107,13 @@ def blocks_of(residual: np.ndarray, trial: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    residual : ndarray, (rows,)
-    trial : ndarray of int (rows,)
+    residual : ndarray, shape (rows,)
+    trial : ndarray of int, shape (rows,)
         Counts from 0; a block never spans two trials.
 
     Returns
     -------
-    ndarray of int (rows,)
+    ndarray of int, shape (rows,)
         Block of each row, from 0.
 
     """
@@ -132,7 +132,7 @@ def memory(residual: np.ndarray) -> float:
 
     Parameters
     ----------
-    residual : ndarray, (rows,)
+    residual : ndarray, shape (rows,)
 
     Returns
     -------
@@ -152,13 +152,13 @@ def correlogram(residual: np.ndarray, most: int | None = None) -> np.ndarray:
 
     Parameters
     ----------
-    residual : ndarray, (rows,)
+    residual : ndarray, shape (rows,)
     most : int, optional
         Largest lag in rows; a quarter of the rows by default.
 
     Returns
     -------
-    ndarray of float64 (lags + 1,)
+    ndarray of float64, shape (lags + 1,)
         1 at lag 0; 0 everywhere else for a residual that does not vary.
 
     """
@@ -180,10 +180,10 @@ def binned(signal: str, values: np.ndarray, residual: np.ndarray, block: np.ndar
     Parameters
     ----------
     signal : str
-    values, residual : ndarray, (rows,)
-    block : ndarray of int (rows,)
+    values, residual : ndarray, shape (rows,)
+    block : ndarray of int, shape (rows,)
         As `blocks_of` gives them.
-    edges : ndarray, (bins - 1,), optional
+    edges : ndarray, shape (bins - 1,), optional
         Where one bin ends and the next begins.
 
     Returns
@@ -243,9 +243,9 @@ def regions(signals: Mapping[str, np.ndarray], residual: np.ndarray, block: np.n
 
     Parameters
     ----------
-    signals : dict of str to ndarray (rows,)
-    residual : ndarray, (rows,)
-    block : ndarray of int (rows,)
+    signals : dict of str to ndarray, shape (rows,)
+    residual : ndarray, shape (rows,)
+    block : ndarray of int, shape (rows,)
     quantity : str
         The response, for units.
 
@@ -285,7 +285,7 @@ def united(scored: Sequence[tuple[float, np.ndarray, Region]]) -> list[
 
     Parameters
     ----------
-    scored : sequence of (float, ndarray of bool (rows,), Region)
+    scored : sequence of (float, ndarray of bool, shape (rows,), Region)
         Worst first.
 
     Returns

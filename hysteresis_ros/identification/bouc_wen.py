@@ -61,7 +61,7 @@ def fit_bouc_wen(parts: Sequence[np.ndarray], target: np.ndarray, low: float, hi
 
     Parameters
     ----------
-    parts : sequence of ndarray, each (1 + rows,)
+    parts : sequence of ndarray, each shape (1 + rows,)
         Inputs of each trial from a saturated memory on; the first has no output.
     target : ndarray, shape (n,)
         Outputs of all other inputs, trial after trial.

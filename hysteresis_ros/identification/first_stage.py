@@ -60,7 +60,7 @@ def first_stage_from_lengths(
 
     Parameters
     ----------
-    drives, loads, lengths : sequence of ndarray, each (rows,)
+    drives, loads, lengths : sequence of ndarray, each shape (rows,)
         One entry a trial.
     cold : float
         Drive of the cold state.

@@ -38,7 +38,7 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
     ----------
     kind : {'preisach', 'play', 'bouc-wen', 'linear'}
         Operator.
-    parts : sequence of ndarray, each (1 + rows,)
+    parts : sequence of ndarray, each shape (1 + rows,)
         Inputs of each trial from a saturated memory on; the first, the cold one, has no output.
     target : ndarray, shape (n,)
         Outputs of all other inputs, trial after trial.

@@ -295,18 +295,18 @@ def trials(received: np.ndarray, stamp: np.ndarray, voltage: np.ndarray,
 
     Parameters
     ----------
-    received : ndarray of int64 (rows,)
+    received : ndarray of int64, shape (rows,)
         ns.
-    stamp, voltage : ndarray (rows,)
+    stamp, voltage : ndarray, shape (rows,)
         s and V.
     initialising : tuple of ndarray
         Received times and flags.
 
     Returns
     -------
-    trial : ndarray of int (rows,)
+    trial : ndarray of int, shape (rows,)
         Number of cycles before the row.
-    busy : ndarray of bool (rows,)
+    busy : ndarray of bool, shape (rows,)
         Whether the row is inside a cycle.
 
     """

@@ -121,7 +121,7 @@ def write_csv(measurement: Measurement | Mapping[str, ArrayLike], path: AnyPath)
 
     Parameters
     ----------
-    measurement : Measurement or mapping of str to array_like (rows,)
+    measurement : Measurement or mapping of str to array_like, each shape (rows,)
         Columns in their order; `trial`, `step` and flags are written as whole numbers.
     path : str or Path
 

@@ -60,7 +60,7 @@ def hold_ends(measurement: Measurement, hold: float = SETTLED_HOLD,
 
     Returns
     -------
-    ndarray of int (holds, 2) or None
+    ndarray of int, shape (holds, 2), or None
         First row that is averaged and row after the last. None if a hold is shorter, unless it
         begins or ends its trial, or if there is none.
 
@@ -84,13 +84,13 @@ def mean_of_windows(values: np.ndarray, windows: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : ndarray, (rows,)
-    windows : ndarray of int (n, 2)
+    values : ndarray, shape (rows,)
+    windows : ndarray of int, shape (n, 2)
         As `hold_ends` gives them.
 
     Returns
     -------
-    ndarray of float64 (n,)
+    ndarray of float64, shape (n,)
 
     """
     return np.array([values[low:high].mean() for low, high in windows])
@@ -102,7 +102,7 @@ def holds(drive: np.ndarray, rows: slice, tolerance: float = 1e-3) -> list[tuple
 
     Parameters
     ----------
-    drive : ndarray, (rows,)
+    drive : ndarray, shape (rows,)
     rows : slice
         The trial.
     tolerance : float

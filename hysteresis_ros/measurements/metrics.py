@@ -49,7 +49,7 @@ def errors(residual: np.ndarray, output_range: float) -> Errors:
 
     Parameters
     ----------
-    residual : ndarray, (rows,)
+    residual : ndarray, shape (rows,)
         Measured less predicted.
     output_range : float
         P of Eqs. 23 and 24: largest less smallest measured output, same unit.

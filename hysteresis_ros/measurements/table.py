@@ -42,7 +42,7 @@ class Measurement:
         What was applied: 'voltage', 'temperature', 'pressure', 'current' or 'power'.
     load : str or None
         'force', 'stress' or None.
-    columns : dict of str to ndarray of float64, each (rows,)
+    columns : dict of str to ndarray of float64, each shape (rows,)
         Every numeric column, in SI units; unknown ones are kept.
     source : str
         File or folder that the rows came from.
@@ -71,7 +71,7 @@ class Measurement:
 
         Parameters
         ----------
-        columns : mapping of str to array_like, each (rows,)
+        columns : mapping of str to array_like, each shape (rows,)
             A missing `trial` column means one trial.
         source, digest, warnings
             As the attributes.
@@ -150,7 +150,7 @@ class Measurement:
 
         Returns
         -------
-        ndarray of float64, (rows,)
+        ndarray of float64, shape (rows,)
 
         Raises
         ------
@@ -209,7 +209,7 @@ class Measurement:
 
         Parameters
         ----------
-        rows : ndarray of bool (rows,) or of int, or slice
+        rows : ndarray of bool, shape (rows,), or of int, or slice
 
         Returns
         -------

@@ -60,7 +60,7 @@ class Table(NamedTuple):
 
     Attributes
     ----------
-    columns : dict of str to ndarray of float64 (rows,)
+    columns : dict of str to ndarray of float64, shape (rows,)
         By meaning, in the units of files; text is left out.
     origin : dict of str to Column
         Of each column, how it stands in the file.

@@ -20,7 +20,7 @@ def largest_values(columns: Mapping[str, np.ndarray]) -> dict[str, float]:
 
     Parameters
     ----------
-    columns : mapping of str to ndarray (rows,)
+    columns : mapping of str to ndarray, shape (rows,)
         In the units of files.
 
     Returns

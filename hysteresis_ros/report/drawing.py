@@ -114,7 +114,7 @@ def thinned(x: np.ndarray, y: np.ndarray,
 
     Parameters
     ----------
-    x, y : ndarray, (rows,)
+    x, y : ndarray, shape (rows,)
         x ascending.
     most : int
         About how many points may stay.

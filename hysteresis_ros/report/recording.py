@@ -116,7 +116,7 @@ def extremes(series: Sequence[np.ndarray], trial: np.ndarray, most: int) -> np.n
 
     Parameters
     ----------
-    series : sequence of ndarray, each (rows,)
+    series : sequence of ndarray, each shape (rows,)
     trial : ndarray of int, shape (rows,)
         Both ends of each trial are chosen, too.
     most : int
