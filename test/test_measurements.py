@@ -212,3 +212,25 @@ def test_units_become_those_of_files(name, unit, written, value):
     """Each against a value that a person knows."""
     found = UNITS[name][unit].convert(np.array([written]))
     assert found == pytest.approx([value], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize('trial, time, expected', [
+    ([0, 0, 1, 1], [30, 60, 90, 120], [30, 60, 30, 60]),
+    ([0, 0, 1, 1], [0.0, 0.1, 95.0, 95.1], [0.0, 0.1, 0.1, 0.2]),
+    ([0, 0, 1, 1], [1.7e9, 1.7e9 + 2, 1.7e9 + 50, 1.7e9 + 52], [0, 2, 2, 4]),
+    ([0, 0, 0, 0], [1.7e9, 1.7e9 + 2, 1.7e9 + 4, 1.7e9 + 6], [0, 2, 4, 6])])
+def test_a_clock_that_runs_on_is_counted_from_the_start_of_each_trial(trial, time, expected):
+    """Pauses between trials are not known to be anything; no row begins later than usual."""
+    table = Measurement.from_columns({
+        'trial': trial, 'time': time, 'voltage': [1, 2, 1, 2], 'angle': [2.0, 1.5, 2.0, 1.6]})
+    assert table.time == pytest.approx(expected)
+    assert 'it is counted from' in table.warnings[0]
+
+
+@pytest.mark.parametrize('trial, time', [
+    ([0, 0, 1, 1], [30, 60, 30, 60]), ([0, 0, 1, 1], [0, 10, 5, 20]), ([0, 1, 2, 3], [1, 2, 3, 4]),
+    ([0, 0, 0, 0], [30, 60, 90, 120])])
+def test_a_time_that_begins_with_each_trial_stays(trial, time):
+    table = Measurement.from_columns({
+        'trial': trial, 'time': time, 'voltage': [1, 2, 1, 2], 'angle': [2.0, 1.5, 2.0, 1.6]})
+    assert table.time == pytest.approx(time) and table.warnings == ()

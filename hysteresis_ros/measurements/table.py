@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.problems import refuse
 from hysteresis_ros.measurements.quantities import DRIVES, LOADS, QUANTITIES, RESPONSES
-from hysteresis_ros.measurements.unit_checks import largest_values, unit_problems, unit_warnings
+from hysteresis_ros.measurements.unit_checks import (
+    largest_values, SECONDS_OF_A_DAY, unit_problems, unit_warnings)
 from hysteresis_ros.spelling import closest, short_list, suggestion
 import numpy as np
 
@@ -101,6 +102,10 @@ class Measurement:
         if rows == 0:
             raise MeasurementError(f'{source}: the table has no rows')
         arrays.setdefault('trial', np.zeros(rows))
+        notes = list(warnings)
+        if 'time' in arrays:
+            arrays['time'], note = time_of_trials(arrays['time'], arrays['trial'])
+            notes += [f'{source}: {note}'] if note else []
         problems = []
         for name, values in arrays.items():
             if is_known(name) and not np.all(np.isfinite(values)):
@@ -113,7 +118,7 @@ class Measurement:
             problems = order_problems(measurement) + unit_problems(largest, origin)
         refuse(str(source), problems)
         return replace(measurement, warnings=(
-            *warnings, *name_warnings(measurement),
+            *notes, *name_warnings(measurement),
             *(f'{source}: {note}' for note in unit_warnings(largest, origin))))
 
     @property
@@ -285,6 +290,41 @@ def meant_by(names: Sequence[str], columns: Collection[str]) -> str:
                 f'--columns {name}={column}')
     return (f'the columns are {short_list(columns)}; say which with '
             f'--columns {names[0]}=COLUMN')
+
+
+def time_of_trials(time: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, str]:
+    """
+    Return the time counted from the start of each trial, and what was changed for that.
+
+    Clocks of instruments run on from one trial to the next, and count from a day of their own. The
+    first row of a trial comes after what passed since the row before, but not after more than
+    rows are usually apart: what the muscle did between two trials is not known.
+
+    Parameters
+    ----------
+    time, trial : ndarray, shape (rows,)
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+    str
+        '' if nothing was.
+
+    """
+    begins = np.flatnonzero(np.append(True, np.diff(trial) != 0))
+    gaps = np.diff(time)
+    between, within = gaps[begins[1:] - 1], np.delete(gaps, begins[1:] - 1)
+    runs_on = len(between) > 0 and len(within) > 0 and bool(
+        np.all(between > 0.0) and np.all(within >= 0.0))
+    far = bool(time[0] > SECONDS_OF_A_DAY)
+    if not (runs_on or far and len(begins) == 1):
+        return time, ''
+    first = np.append(0.0 if far else time[0], np.minimum(between, np.median(within))
+                      if runs_on else ())
+    rows = np.diff(np.append(begins, len(time)))
+    return time - np.repeat(time[begins] - first, rows), (
+        'time runs on from trial to trial; it is counted from the start of each' if runs_on
+        else f'time begins at {time[0]:.9g} s; it is counted from there')
 
 
 def order_problems(measurement: Measurement) -> list[str]:
