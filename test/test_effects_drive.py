@@ -55,6 +55,12 @@ def test_inverse_undoes_the_forward_map(drive, phase, name):
         assert made.inverse(forward, inputs, WIRE) == pytest.approx(drive, abs=1e-11)
 
 
+def test_less_than_nothing_stays_out_of_reach_behind_a_dead_zone():
+    """A warmer room than that of the bench may ask for it; zero would be a lie."""
+    made = effect('pwm_dead_zone', Vd=1.0)
+    assert made.inverse(-2.0, ROOM, WIRE) < 0.0 == made.inverse(0.0, ROOM, WIRE)
+
+
 def test_dead_zone_as_wide_as_the_range_stays_finite():
     made = effect('pwm_dead_zone', Vd=7.0)
     out = float(made.forward(8.0, ROOM, WIRE))

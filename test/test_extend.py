@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.cli.main import main
-from hysteresis_ros.diagnosis.determined import undetermined
+from hysteresis_ros.diagnosis.determined import not_determined, undetermined
 from hysteresis_ros.diagnosis.extend import extend, extend_by_hand, rmse
+from hysteresis_ros.effects import effect_class
 from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.measurements import Measurement, write_csv
 from hysteresis_ros.model import MuscleModel
@@ -314,3 +315,12 @@ def test_values_and_trials_that_make_no_sense_are_refused(files, capsys, words, 
     except SystemExit as left:
         found = left.code
     assert found == status and line in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize('interval, determined', [
+    ((0.3, 0.5), True), ((0.01, 0.5), False), ((0.0, 0.009), False), ((0.01, 0.9), False)])
+def test_a_size_is_determined_where_nothing_too_small_to_matter_is_likely(interval, determined):
+    """Nor is one that is known to be nothing."""
+    effect = effect_class('stress_dependent_strain')(None, r=0.2)
+    effect.intervals['r'] = interval
+    assert (not_determined(effect, 'bench') is None) == determined

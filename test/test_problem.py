@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which rows are judged together, what they can show, and what a sensor adds."""
 
+import warnings
+
 from model_support import bicep_model, ROWS, runs
 import numpy as np
 import pytest
@@ -145,3 +147,15 @@ def test_recordings_that_do_not_go_together_are_refused():
                           ([bench, runs(model, 1)], 'several kinds')):
         with pytest.raises(MeasurementError, match=words):
             problem_for(model, given_)
+
+
+def test_rows_written_twice_have_the_rate_of_their_time():
+    """Loggers do so; the rate would be no number there, and no signal."""
+    rows = np.repeat(np.arange(8), 2)
+    table = Measurement.from_columns({
+        'time': 0.1 * rows, 'voltage': np.sin(rows), 'angle': 2.0 - 0.1 * np.sin(rows)})
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        rate = problem_for(bicep_model(), [table]).signals['rate']
+    once = np.gradient(np.sin(np.arange(8)), 0.1 * np.arange(8))
+    assert rate == pytest.approx(np.repeat(once, 2))

@@ -59,6 +59,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.api import identify
+    from hysteresis_ros.diagnosis.determined import undetermined
     from hysteresis_ros.model.loads import reached_angles
     from hysteresis_ros.report.words import load_in_words
 
@@ -80,6 +81,9 @@ def run(args: argparse.Namespace) -> None:
     steps.clear()
     found.model.save(args.output)
     say(args, report(found))
+    for effect in found.model.effects:
+        for note in undetermined(effect, 'bench'):
+            warn(note)
     for name in worse_than_a_line(found):
         warn(f'{name}: the model is worse than a straight line; check sign and unit of the columns '
              'and the trials')

@@ -39,6 +39,11 @@ def not_determined(effect: Effect, kind: str) -> str | None:
     if notes:
         return notes[0]
     low, high = effect.intervals.get(size.name, (math.nan, math.nan))
-    if low <= size.low and high >= (-size.low if size.both_signs else size.low):
+    if size.both_signs:
+        small = low <= size.low and high >= -size.low
+    else:
+        # An interval that ends below says that there is nothing.
+        small = low <= size.low and (high >= size.low or size.neutral <= size.low)
+    if small:
         return f'the interval of {effect.id}.{size.name} contains a value too small to matter'
     return None

@@ -151,7 +151,7 @@ class Problem:
                 last = np.maximum.accumulate(np.where(moving, np.arange(len(drive)), 0))
                 of_trial = {
                     'drive': drive, 'load': trial.load,
-                    'rate': np.gradient(drive, time) if len(drive) > 1 else np.zeros(1),
+                    'rate': _rate(drive, time),
                     'direction': np.sign(change)[last], 'time': time,
                     'clock': trial.inputs.clock, 'since_step': time - time[last],
                     'cycles': trial.inputs.cycles, 'ambient': trial.inputs.ambient}
@@ -166,3 +166,11 @@ class Problem:
         self.clock = signals['clock'] + np.repeat(ends[:-1], [len(rows) for rows in self.chosen])
         return {name: values for name, values in signals.items()
                 if np.all(np.isfinite(values)) and np.ptp(values) > 0.0}
+
+
+def _rate(drive: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return the derivative of the drive [1/s] in each row; rows of one time have the same."""
+    _, first, place = np.unique(time, return_index=True, return_inverse=True)
+    if len(first) < 2:
+        return np.zeros(len(drive))
+    return np.gradient(drive[first], time[first])[place]

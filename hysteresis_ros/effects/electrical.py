@@ -72,8 +72,8 @@ class PwmDeadZone(ElectricalEffect):
         return np.maximum(signal - self.Vd, 0.0) * self._stretch(surroundings)
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
-        """Add the dead zone again; zero stays zero."""
-        return signal / self._stretch(surroundings) + self.Vd if signal > 0.0 else 0.0
+        """Add the dead zone again; zero stays zero, and what is below it out of reach."""
+        return signal / self._stretch(surroundings) + self.Vd if signal > 0.0 else signal
 
     def _stretch(self, surroundings: Surroundings) -> float:
         full = math.sqrt(surroundings.full_drive_squared)
