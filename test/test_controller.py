@@ -240,6 +240,35 @@ def test_a_reference_that_is_no_number_keeps_the_last_voltage(bad):
     assert math.isfinite(controller.hold(bad))
 
 
+def driven(model, targets):
+    """Return for targets [deg] what is expected of the muscle [m], what it does, and the miss."""
+    controller, observer, found = model.controller(arm=True), model.observer(), []
+    for number, target in enumerate(targets, 1):
+        point = controller.setpoint(*controller.reference(math.radians(target)), 30.0 * number)
+        angle = observer.step(30.0 * number, point.voltage)
+        found.append((point.saturated, point.expected, model.geometry.length(angle),
+                      math.degrees(angle) - target))
+    return found
+
+
+@pytest.mark.parametrize('names', [(), ('supply_sag',), ('cable_friction',),
+                                   ('payload_error', 'resistance_change')])
+def test_memory_is_right_after_a_target_out_of_reach(names):
+    """There the arm rests under another load than that of the target."""
+    for far, sign in ((40.0, 1.0), (150.0, -1.0)):
+        first, *others = driven(bicep_model(names), [far, 90.0, 95.0, 87.0])
+        assert first[0] and sign * first[3] > 20.0
+        assert first[1] == pytest.approx(first[2], abs=1e-7)
+        assert not any(saturated for saturated, *_ in others)
+        assert [miss for *_, miss in others] == pytest.approx([0.0, 0.0, 0.0], abs=1e-3)
+
+
+@pytest.mark.parametrize('name', ['r_phase', 'fatigue', 'creep'])
+def test_the_resistance_is_that_of_the_martensite_whatever_else_lengthens_the_muscle(name):
+    found = driven(bicep_model(['resistance_change', name]), [92.0, 88.0, 96.0, 90.0])
+    assert [miss for *_, miss in found] == pytest.approx([0.0] * 4, abs=1e-3)
+
+
 @pytest.mark.parametrize('names', [(), ('r_phase',), ('unequal_muscles',), ('supply_sag',),
                                    ('resistance_change',)])
 @pytest.mark.parametrize('length, voltage', [(-0.06, 5.0), (0.04, 1.0)])

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Passes that bring a clipped drive into agreement with the phase that it causes.
 PHASE_PASSES = 20
+# Share of martensite that makes no difference to the drive.
+SAME_SHARE = 1e-9
 # A reference that is missed by less than this share of the range is reached: the tables of the arm
 # are about as exact.
 REACHED = 1e-6
@@ -57,11 +59,17 @@ class Setpoint(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a drive would do: `length` [m], `drive_squared`, and what the muscles commit."""
+    """
+    What a drive would do.
+
+    `length` [m], `drive_squared`, what the muscles commit, and their share of martensite where an
+    effect needs it.
+    """
 
     length: float
     drive_squared: float
     following: np.ndarray
+    phase: float
 
 
 class Controller:
@@ -380,10 +388,16 @@ class Controller:
         find = self._search if self._steady.drifts else self._invert
         drive, saturated = find(length, force, inputs)
         outcome = self._outcome(drive, force, inputs)
-        if saturated and self._chain.needs_phase:
+        if self._steady.drifts and self._chain.needs_phase:
+            # Of a length to which time and use add, the transformation's share is not known before.
             for _ in range(PHASE_PASSES):
-                inputs = inputs._replace(phase=self._share(outcome.length, force))
+                if abs(outcome.phase - inputs.phase) <= SAME_SHARE:
+                    break
+                inputs = inputs._replace(phase=outcome.phase)
+                drive, saturated = find(length, force, inputs)
                 outcome = self._outcome(drive, force, inputs)
+        if saturated:
+            outcome, inputs = self._at_limit(drive, force, inputs)
         # At the ends of the drive a plateau, or rounding, may give just what was asked for.
         saturated = saturated and not (
             abs(outcome.length - length) <= REACHED * self._chain.surroundings.span)
@@ -394,6 +408,17 @@ class Controller:
             reason = (f'length {1e3 * length:.3f} mm under {force:.3f} N is out of reach within '
                       f'{limits} {self.model.drive}; expected {1e3 * outcome.length:.3f} mm')
         return Setpoint(applied, saturated, outcome.length, outcome.length - length, reason)
+
+    def _at_limit(self, drive: float, force: float, inputs: Inputs) -> tuple[Outcome, Inputs]:
+        """Say what a drive does that does not lead to the reference, under the load that it has."""
+        for _ in range(PHASE_PASSES if self._chain.needs_phase else 1):
+            if self._arm and self.model.geometry is not None:
+                stopped = self._targets.stopped(
+                    lambda tension: self._outcome(drive, tension, inputs).length)
+                force = force if stopped is None else stopped.force
+            if self._chain.needs_phase:
+                inputs = inputs._replace(phase=self._outcome(drive, force, inputs).phase)
+        return self._outcome(drive, force, inputs), inputs
 
     def _transformed(self, length: float, force: float) -> float:
         """Return what the transformation has to give for a length [m] under a force [N]."""
@@ -448,7 +473,9 @@ class Controller:
         base, felt = self._second.base, np.float64(force)
         length = (base + float(self._chain.scale(felt)) * factor * (output - base)
                   + float(self._chain.stretch(felt)) + offset)
-        return Outcome(length, drive_squared, committed)
+        phase = (float(self.model.martensite(self._second.given(output, force)))
+                 if self._chain.needs_phase else math.nan)
+        return Outcome(length, drive_squared, committed, phase)
 
     def _commit(self, drive: float, outcome: Outcome, inputs: Inputs, time: float | None) -> float:
         self._first.step(outcome.drive_squared)

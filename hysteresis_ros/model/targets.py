@@ -11,7 +11,11 @@ import numpy as np
 from hysteresis_ros.bicep.geometry import BicepGeometry, Reference
 from hysteresis_ros.effects import Statics
 from hysteresis_ros.errors import RangeError
+from hysteresis_ros.false_position import false_position
 from hysteresis_ros.model.chain import Chain
+
+# Elongation [m] by which muscle and arm may differ where the arm comes to rest.
+AT_REST = 1e-9
 
 
 class Targets:
@@ -74,11 +78,22 @@ class Targets:
             raise
 
     def _hold(self, theta: float, true: float) -> Reference:
-        geometry = self._geometry
-        friction = sum(effect.resistance()[0] for effect in self._chain.mechanism)
-        capstan = sum(effect.capstan() for effect in self._chain.mechanism)
+        friction, capstan = self._friction()
         if friction > 0.0 or capstan > 0.0:
             true = self._with_direction(true)
+        found = self._balanced(theta, true)
+        self._angle = true
+        return found
+
+    def _friction(self) -> tuple[float, float]:
+        """Return the moment of dry friction [N m], and the exponent of that of the cables."""
+        mechanism = self._chain.mechanism
+        return (sum(effect.resistance()[0] for effect in mechanism),
+                sum(effect.capstan() for effect in mechanism))
+
+    def _balanced(self, theta: float, true: float) -> Reference:
+        """Return elongation and tension that hold the arm at an angle [rad] after its last way."""
+        geometry, (friction, capstan) = self._geometry, self._friction()
         statics = Statics.of(geometry, np.array([true]))
         for effect in self._chain.mechanism:
             statics = effect.forward(statics, geometry)
@@ -89,10 +104,38 @@ class Targets:
         if moment < 0.0:
             raise RangeError(f'nothing pulls the arm to the target angle {theta:.4f} rad; the '
                              'muscle would have to push')
-        self._angle = true
         force = max(moment - self._direction * friction, 0.0) / (
             leverage * math.exp(self._direction * capstan))
         return Reference(float(statics.length[0]), force)
+
+    def stopped(self, length: Callable[[float], float]) -> Reference | None:
+        """
+        Return where the arm comes to rest that cannot reach its target.
+
+        Parameters
+        ----------
+        length : callable
+            Elongation [m] of a muscle under a tension [N].
+
+        Returns
+        -------
+        Reference or None
+            Elongation and tension there; None where the arm leaves its range.
+        """
+        def gap(true: float) -> float:
+            found.append(self._balanced(true, true))
+            return length(found[-1].force) - found[-1].length
+
+        found: list[Reference] = []
+        low, high = self._geometry.angle_range
+        try:
+            ends = (low, gap(low)), (high, gap(high))
+            if ends[0][1] * ends[1][1] >= 0.0:
+                return None
+            self._angle = false_position(gap, *ends, AT_REST)
+        except RangeError:
+            return None
+        return found[-1]
 
     def _with_direction(self, true: float) -> float:
         """Note the direction of the motion to an angle, and return where it leads [rad]."""
