@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 
+from hidden_cases import clean_bench, TRIALS, UNIVERSAL
 from model_support import autoregressive, with_noise
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import experiment_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
+from hysteresis_ros.laboratory.plant import Plant
 from hysteresis_ros.measurements import Measurement
 
 SEED = 11
@@ -146,6 +148,26 @@ def test_a_lag_shows_in_transients(model):
     assert found.verdict == 'missing' and 'thermal_lag' in reported(found)
     assert found.rmse_after < 0.5 * found.rmse_before
     check_json(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('tau, dt, hold', [(0.05, 0.02, 1.0), (0.1, 0.02, 1.0),
+                                           (100.0, 2.0, 150.0)])
+def test_lags_at_the_ends_of_their_range_are_found(tau, dt, hold):
+    """On a wire of other physics than the model's, where a fit from far away does not arrive."""
+    model, _ = add_effects(*clean_bench(41, 'brinson'), [*UNIVERSAL, 'transformation_slopes'],
+                           **TRIALS)
+    plant, rows = Plant(41, {}, muscle='brinson', heat_time_constant=tau), round(30 * hold / dt)
+    trials = []
+    for trial in range(2):
+        time = np.round(dt * np.arange(1, rows + 1), 4)
+        levels = np.random.default_rng(trial).uniform(0.0, 6.0, 31)
+        run = plant.arm_run(time, np.round(levels[(time / hold).astype(int)], 3))
+        trials.append({**run, 'trial': np.full(rows, trial)})
+    found = diagnose(model, [Measurement.from_columns({
+        name: np.concatenate([run[name] for run in trials]) for name in trials[0]})])
+    assert found.missing == ['thermal_lag']
+    assert found.effects[0].time_constant == pytest.approx(tau, rel=0.03)
 
 
 def test_what_no_catalogue_has_is_called_unknown(model):

@@ -81,8 +81,8 @@ EXPECTED = {
 RANGES = {
     ('supply_sag', 'Rs'): ('Ohm', 0.05, 2.0), ('pwm_dead_zone', 'Vd'): ('V', 0.05, 1.5),
     ('measured_supply', 'nominal'): ('V', 3.0, 60.0),
-    ('thermal_lag', 'time_constant'): ('s', 0.05, 100.0),
-    ('valve_lag', 'filling'): ('s', 0.05, 100.0), ('valve_lag', 'venting'): ('s', 0.05, 100.0),
+    ('thermal_lag', 'time_constant'): ('s', 0.03, 150.0),
+    ('valve_lag', 'filling'): ('s', 0.03, 150.0), ('valve_lag', 'venting'): ('s', 0.03, 150.0),
     ('heat_loss', 'growth'): ('1', 0.05, 1.5),
     ('heating_cooling_asymmetry', 'ratio'): ('1', 0.5, 2.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
     ('viscoelastic_creep', 'J'): ('% of l0', 0.01, 2.0),

@@ -26,7 +26,7 @@ from hysteresis_ros.kernels.latent import phase_along_branches
 FASTEST = 1e12
 # Time constants [s] of muscles, from a thin wire in water to a thick one in still air, a polymer
 # thread or a long bladder behind a small valve.
-LAGS = 0.05, 100.0
+LAGS = 0.03, 150.0
 
 
 class ThermalEffect(DriveEffect):
@@ -184,7 +184,7 @@ class ThermalLag(FirstOrderLag):
     confused_with = ('latency', 'viscous_friction', 'creep')
     parameters = (
         Parameter('time_constant', 's', 'time constant 1/d1 of Eq. 1', *LAGS, 0.0,
-                  (0.3, 1.5, 6.0, 25.0), log=True),)
+                  (0.08, 0.3, 1.2, 5.0, 20.0, 80.0), log=True),)
 
 
 class HeatingCoolingAsymmetry(FirstOrderLag):
