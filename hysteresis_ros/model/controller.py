@@ -98,7 +98,9 @@ class Controller:
     lag_margin : float
         Share, 0 to less than 1, by which the muscle's time constant may differ from the model's,
         if its interval does not say more. Nothing inside is overdriven beyond its temperature; what
-        is slower than the fastest then comes later. 0: the model's own muscle arrives exactly.
+        is slower than the fastest then comes later. 0: the model's own muscle arrives exactly. With
+        a margin m it lacks at least about m of a step by then, and has come within a share s of it
+        after log(m / s) / log(1 / s) of the time that it takes by itself: half for m = sqrt(s).
     rate_limit : float
         Largest change of the drive a second, where times are given; the rest of the way is done by
         the calls of `hold`. It must be positive.
