@@ -197,6 +197,7 @@ def test_the_command_prints_a_table_writes_json_and_draws(tmp_path, capsys, monk
     assert captured.err == ''
     assert lines[2].split()[0] == 'operator' and lines[3].startswith('Bouc-Wen')
     assert lines[-1].startswith('Take Bouc-Wen')
+    assert '`hysteresis identify --operator bouc-wen --levels 4 4`' in lines[-1]
     content = json.loads((tmp_path / 'o.json').read_text())
     assert content['best'] == content['simplest'] == 'Bouc-Wen'
     assert content['advice'] == lines[-1] and content['unit'] == '1'

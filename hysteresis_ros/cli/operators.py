@@ -90,9 +90,10 @@ def percent(error: float, choice: Choice) -> str:
 def advice(choice: Choice) -> str:
     """Return which operator to take, in one line."""
     best, simplest = choice.best, choice.simplest
+    how = f' `hysteresis identify {simplest.options}` identifies it.' if simplest.options else ''
     if best is simplest:
         return (f'Take {best.name}: the smallest error ({percent(best.held_out, choice)}), and '
-                f'nothing with fewer than its {best.parameters} parameters comes as close.')
+                f'nothing with fewer than its {best.parameters} parameters comes as close.{how}')
     return (f'Take {simplest.name} ({percent(simplest.held_out, choice)} with '
             f'{simplest.parameters} parameters): it cannot be told from the smallest error, '
-            f'{percent(best.held_out, choice)} of {best.name} with {best.parameters}.')
+            f'{percent(best.held_out, choice)} of {best.name} with {best.parameters}.{how}')

@@ -76,10 +76,15 @@ class FittedModel:
 
 @dataclasses.dataclass(frozen=True)
 class Candidate:
-    """A model by name, and how it is fitted: ``fit(fold)`` returns a `FittedModel`."""
+    """
+    A model by name, and how it is fitted: ``fit(fold)`` returns a `FittedModel`.
+
+    `options` are those of `hysteresis identify` that identify it, '' if there are none.
+    """
 
     name: str
     fit: Callable
+    options: str = ''
 
 
 def parameters_of(operator: HysteresisOperator) -> int:
@@ -125,9 +130,10 @@ def candidates(length: Measurement, force: Measurement | None,
     names = [('preisach', f'Preisach N = {levels}', levels) for levels in LEVELS]
     names += [('play', f'Prandtl-Ishlinskii, {plays} plays', plays) for plays in PLAYS]
     names += [('bouc-wen', 'Bouc-Wen', LEVELS[0])]
-    found = [Candidate('line', _line)]
+    found = [Candidate('line', _line, '--operator linear')]
     left_out: dict[str, str] = {}
-    found += [Candidate(name, functools.partial(_of_the_drive, kind, levels))
+    found += [Candidate(name, functools.partial(_of_the_drive, kind, levels), (
+        f'--operator {kind} --levels {levels} {levels}' if length.load is None else ''))
               for kind, name, levels in names]
     if length.load is None:
         return found, left_out
@@ -135,8 +141,10 @@ def candidates(length: Measurement, force: Measurement | None,
         left_out['two-stage models'] = ('one trial shows H1 only with a force table; give --force '
                                         'or more trials')
         return found, left_out
-    found += [Candidate(f'two-stage {name}', functools.partial(_two_stage, kind, levels))
-              for kind, name, levels in names]
+    found += [Candidate(
+        f'two-stage {name}', functools.partial(_two_stage, kind, levels),
+        f'--operator {"two-stage" if kind == "preisach" else kind} '
+        f'--levels {max(1, levels // 2)} {levels}') for kind, name, levels in names]
     found.append(Candidate('embedded line, N = 20', _embedded_line))
     if by_trial:
         found.append(Candidate('additive, N = 20', _additive))

@@ -52,6 +52,8 @@ class Score:
         Numbers that the model stores.
     simulate_us, invert_us : float
         Time of one row of a sequence, and of one scalar inverse with its commit, in microseconds.
+    options : str
+        Of `hysteresis identify`, by which it is identified; '' if there are none.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Score:
     parameters: int
     simulate_us: float
     invert_us: float
+    options: str = ''
 
 
 @dataclasses.dataclass(frozen=True)
@@ -205,7 +208,7 @@ def _score(candidate: Candidate, table: Measurement, force: Measurement | None,
     simulate, invert = time_per_step(model.operator, first, _simulated(model, first))
     return Score(candidate.name, float(np.sqrt(held_out / len(measured))),
                  float(np.sqrt(fitted / len(masks))), np.array(errors), model.parameters,
-                 1e6 * simulate, 1e6 * invert)
+                 1e6 * simulate, 1e6 * invert, candidate.options)
 
 
 def _simulated(model: FittedModel, inputs: np.ndarray) -> np.ndarray:
