@@ -229,7 +229,7 @@ def test_a_clock_that_runs_on_is_counted_from_the_start_of_each_trial(trial, tim
 
 @pytest.mark.parametrize('trial, time', [
     ([0, 0, 1, 1], [30, 60, 30, 60]), ([0, 0, 1, 1], [0, 10, 5, 20]), ([0, 1, 2, 3], [1, 2, 3, 4]),
-    ([0, 0, 0, 0], [30, 60, 90, 120])])
+    ([0, 0, 0, 0], [30, 60, 90, 120]), ([0, 0, 0, 0], [2e6, 2e6 + 30, 2e6 + 60, 2e6 + 90])])
 def test_a_time_that_begins_with_each_trial_stays(trial, time):
     table = Measurement.from_columns({
         'trial': trial, 'time': time, 'voltage': [1, 2, 1, 2], 'angle': [2.0, 1.5, 2.0, 1.6]})

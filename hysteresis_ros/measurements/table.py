@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.problems import refuse
 from hysteresis_ros.measurements.quantities import DRIVES, LOADS, QUANTITIES, RESPONSES
-from hysteresis_ros.measurements.unit_checks import (
-    largest_values, SECONDS_OF_A_DAY, unit_problems, unit_warnings)
+from hysteresis_ros.measurements.unit_checks import largest_values, unit_problems, unit_warnings
 from hysteresis_ros.spelling import closest, short_list, suggestion
 import numpy as np
 
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
 
 SETTLED_HOLD = 20.0
 """Rows of a run that are at least this many seconds apart are settled states."""
+CALENDAR = 1e8
+"""Times from here on [s], three years, are of a calendar and not since the muscle was cold."""
 
 
 class MeasurementWarning(UserWarning):
@@ -316,7 +317,7 @@ def time_of_trials(time: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, str
     between, within = gaps[begins[1:] - 1], np.delete(gaps, begins[1:] - 1)
     runs_on = len(between) > 0 and len(within) > 0 and bool(
         np.all(between > 0.0) and np.all(within >= 0.0))
-    far = bool(time[0] > SECONDS_OF_A_DAY)
+    far = bool(time[0] > CALENDAR)
     if not (runs_on or far and len(begins) == 1):
         return time, ''
     first = np.append(0.0 if far else time[0], np.minimum(between, np.median(within))
