@@ -184,7 +184,7 @@ def identify(length: Source | None = None, force: Source | None = None, *,
         tables['length'], tables['force'], force_trials=force_trials, length_trials=length_trials,
         geometry=None if geometry is None else _geometry(geometry), levels=levels,
         operator=operator, anchored=anchored)
-    check_lengths(found.model)
+    check_lengths(found.model, tables['length'])
     check_loads(found.model)
     if names == [] or tables['length'] is None:
         return found

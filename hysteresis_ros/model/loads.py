@@ -11,6 +11,7 @@ import numpy as np
 from hysteresis_ros.errors import ParameterError
 
 if TYPE_CHECKING:
+    from hysteresis_ros.measurements import Measurement
     from hysteresis_ros.model.muscle import MuscleModel
 
 # A load this share of the bench's range beyond its ends is as good as at an end.
@@ -71,9 +72,16 @@ def uncovered_load(model: MuscleModel, theta: np.ndarray) -> (
     return (arm, (below, above), True) if wide and inside else None
 
 
-def check_lengths(model: MuscleModel) -> None:
+def check_lengths(model: MuscleModel, length: Measurement | None = None) -> None:
     """
     Refuse lengths that are no elongations of a muscle that contracts.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    length : Measurement, optional
+        The table that it was identified from. A model of a muscle that extends may have either
+        sign, and fits badly with both.
 
     Raises
     ------
@@ -88,10 +96,17 @@ def check_lengths(model: MuscleModel) -> None:
         raise ParameterError(
             f'the length table reaches {largest:.4g} m, which is no elongation of a muscle of '
             f'{rest:.4g} m; give the length less the resting length, or check its unit')
-    if model.sign > 0:
+    if model.sign > 0 or length is not None and _extends(length):
         raise ParameterError(
             'the length table is of a muscle that extends when driven, and the arm needs one that '
             'contracts; give its elongation, which is negative while it is shorter than at rest')
+
+
+def _extends(length: Measurement) -> bool:
+    """Whether a muscle is longer, the more it is driven, under the same load."""
+    drive, response = length.column(length.drive), length.column(length.response)
+    return sum(float(np.sum((drive[rows] - np.mean(drive[rows])) * response[rows]))
+               for _, rows in length.split()) > 0.0
 
 
 def check_loads(model: MuscleModel) -> None:
