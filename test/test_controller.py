@@ -251,7 +251,7 @@ def driven(model, targets):
     return found
 
 
-@pytest.mark.parametrize('names', [(), ('supply_sag',), ('cable_friction',),
+@pytest.mark.parametrize('names', [(), ('supply_sag',), ('cable_friction',), ('coulomb_friction',),
                                    ('payload_error', 'resistance_change')])
 def test_memory_is_right_after_a_target_out_of_reach(names):
     """There the arm rests under another load than that of the target."""

@@ -18,6 +18,7 @@ from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model.chain import Chain
+from hidden_cases import clean_bench
 from model_support import bicep_model, effect_of, misses_of_targets
 
 LOADS = np.linspace(0.0, 12.0, 200)
@@ -102,10 +103,7 @@ def test_a_form_that_comes_out_as_the_simplest_is_free_no_longer():
 
 def test_a_form_that_does_nothing_beside_the_others_is_not_counted():
     """The shift follows a strain that grows with the load, if there is one."""
-    force, length = (Measurement.from_columns(bench_tables({}, 20)[f'{name}.csv'])
-                     for name in ('force', 'length'))
-    model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY),
-                     length_trials=range(4), force_trials=[0]).model
+    model, length, _ = clean_bench(20)
     problem = problem_for(model, [length.select(range(4))])
     fitter, shift = BenchFitter(problem), effect_of(model, 'stress_dependence', C=0.5, follows=0.5)
     strain = effect_of(model, 'stress_dependent_strain', r=0.5)

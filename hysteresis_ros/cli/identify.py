@@ -60,13 +60,14 @@ def run(args: argparse.Namespace) -> None:
     """Do it."""
     from hysteresis_ros.api import identify
     from hysteresis_ros.diagnosis.determined import undetermined
+    from hysteresis_ros.effects import catalogue
     from hysteresis_ros.model.loads import reached_angles
     from hysteresis_ros.report.words import load_in_words
 
     if args.force is None and args.length is None:
         raise ParameterError('nothing to identify; give --length, --force or both')
     meant = closest(args.effects, ('auto', 'none'))
-    if meant not in (None, args.effects):
+    if meant not in (None, args.effects) and args.effects not in catalogue():
         raise ParameterError(f'--effects {args.effects}: did you mean {meant!r}?')
     if args.effects == 'auto':
         say(args, AUTO)

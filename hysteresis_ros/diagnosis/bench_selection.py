@@ -91,7 +91,9 @@ class BenchSelection:
         self.sets: list[Fit] = []
         self.tried: list[Fit] = []
         self.p_values: dict[tuple[str, ...], float] = {}
+        # Each with its fit, which keeps the place that it is known by.
         self._counts: dict[int, tuple[Fit, int]] = {}
+        self._known_notes: dict[int, tuple[Fit, dict[str, str]]] = {}
 
     def run(self) -> None:
         """Fit every effect by itself, grow sets from the best, and compare what they predict."""
@@ -296,9 +298,11 @@ class BenchSelection:
 
     def _notes(self, fit: Fit) -> dict[str, str]:
         """Return why the rows do not determine the size of an effect, of those of a fit."""
-        notes = {effect.id: not_determined(effect, self.problem.kind)
-                 for effect in self.fitter.with_intervals(fit)}
-        return {name: note for name, note in notes.items() if note}
+        if id(fit) not in self._known_notes:
+            notes = {effect.id: not_determined(effect, self.problem.kind)
+                     for effect in self.fitter.with_intervals(fit)}
+            self._known_notes[id(fit)] = fit, {name: note for name, note in notes.items() if note}
+        return self._known_notes[id(fit)][1]
 
     def _determines(self, fit: Fit) -> bool:
         """Whether the rows determine the size of each effect of a fit."""

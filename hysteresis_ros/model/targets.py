@@ -132,7 +132,7 @@ class Targets:
             ends = (low, gap(low)), (high, gap(high))
             if ends[0][1] * ends[1][1] >= 0.0:
                 return None
-            self._angle = false_position(gap, *ends, AT_REST)
+            false_position(gap, *ends, AT_REST)
         except RangeError:
             return None
         return found[-1]
