@@ -13,7 +13,9 @@ It is known before the arm moves.
   (`model.replicates`; Efron, The Jackknife, the Bootstrap and Other Resampling Plans, 1982).
 * The bench holds the load still, while an arm's load moves with the wire: what a load does in the
   middle of a transformation the bench cannot tell. Models that agree on every bench table bound
-  that (`load_history`); but where one of them is an effect that is tried, it speaks for itself.
+  that. One of them feels the present load alone (`load_history`). In another one martensite keeps
+  the strain of the load under which it formed: a share that is the same for the whole wire, so that
+  all rows err together; but where that effect is tried, it speaks for itself.
 """
 
 from __future__ import annotations
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 
 # The error that differs between the directions of the drive, against the common one.
 DIRECTIONAL = 0.5
+# Share of its strain that martensite keeps, root mean square: from none to all, each as likely.
+KEPT = 1.0 / math.sqrt(3.0)
 # Decimals, in parts of its range, to which two drives differ.
 DRIVE_DECIMALS = 9
 # Of as many loads one lies between others, and tells what the model does between them.
@@ -189,12 +193,30 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
     bench = gain * length_errors(problem.model, history.load) / math.sqrt(1.0 + DIRECTIONAL ** 2)
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
-    known = FormationMemory.id in {*tried, *(effect.id for effect in effects)}
-    formation = np.zeros(len(predicted)) if known else gain * history.formation
+    common = [left_out_changes(problem, effects)]
+    if FormationMemory.id not in {*tried, *(effect.id for effect in effects)}:
+        common.append(KEPT * formation_change(problem, effects))
     return Discrepancy(
-        np.column_stack([bench, DIRECTIONAL * direction * bench, history.path, formation]),
+        np.column_stack([bench, DIRECTIONAL * direction * bench, history.path]),
         np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])
-        / settings.correlation, left_out_changes(problem, effects))
+        / settings.correlation, np.column_stack(common))
+
+
+def formation_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+    """
+    Return what the response would change by if martensite kept all of its strain, shape (n,).
+
+    Parameters
+    ----------
+    problem : ArmProblem
+        Rows and model.
+    effects : sequence of Effect
+        All effects of the model, `formation_memory` not among them.
+    """
+    kept = FormationMemory(problem.model.surroundings, kept=1.0)
+    own, keeping = problem.simulate_many([effects, [*effects, kept]])
+    change: np.ndarray = keeping - own
+    return change
 
 
 def left_out_changes(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

@@ -3,14 +3,9 @@
 """
 What a load that moves while the muscle transforms does, and a bench of constant loads cannot tell.
 
-Models that agree on every table with constant loads differ on an arm:
-
-* The load acts inside the operator and leaves its mark in the memory, which is the model here; or
-  the muscle is at each moment as if its present load had acted all along.
-* The strain of the transformation is that of the present load, which is the model here (Brinson,
-  J. Intell. Mater. Syst. Struct. 4 (1993) 229, for detwinned martensite); or martensite keeps the
-  strain of the load under which it formed until it is heated (Lagoudas and others, Int. J.
-  Plasticity 32-33 (2012) 155).
+Models that agree on every table with constant loads differ on an arm: the load acts inside the
+operator and leaves its mark in the memory, which is the model here; or the muscle is at each moment
+as if its present load had acted all along.
 """
 
 from __future__ import annotations
@@ -22,7 +17,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.effects import Effect, Statics
-from hysteresis_ros.kernels.formation import elongations
 from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.model.chain import Chain
 
@@ -46,18 +40,15 @@ class LoadHistory:
         Tension of each muscle at rest [N].
     path : ndarray, shape (n,)
         What the angle would differ if the present load had acted all along [rad].
-    formation : ndarray, shape (n,)
-        What the length would differ if martensite kept the strain with which it formed [m].
     """
 
     load: np.ndarray
     path: np.ndarray
-    formation: np.ndarray
 
 
 def load_history(problem: ArmProblem, effects: Sequence[Effect]) -> LoadHistory:
     """
-    Return what other models that agree on the bench would make of an arm's way.
+    Return what the load does on an arm's way, and would make of it if it left no mark.
 
     Parameters
     ----------
@@ -83,8 +74,8 @@ def load_history(problem: ArmProblem, effects: Sequence[Effect]) -> LoadHistory:
 
 
 def _ways(problem: ArmProblem, effects: Sequence[Effect]
-          ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Give the load and both differences in the rows that are judged, trial by trial."""
+          ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Give the load and the difference in the rows that are judged, trial by trial."""
     model = problem.model
     chain = Chain(effects, model.surroundings)
     first, stage = model.first_stage(chain), model.require_length_stage(chain)
@@ -98,9 +89,9 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
             first.reset()
             cold = chain.to_drive_squared(model.cold_drive)
             x = first.simulate(np.concatenate(([cold], drive_squared)))
-            tension, felt, width, scale = (
+            tension, felt, width = (
                 _from_cold(np.interp(angle[trial.rows], arm.theta, values))
-                for values in (arm.tension, arm.load, arm.width, arm.scale))
+                for values in (arm.tension, arm.load, arm.width))
             if not first.loaded:
                 felt, width = 0.0 * felt, 0.0 * width
             moving = _held(stage, model.sign * (x - felt), width)
@@ -111,8 +102,7 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
                     for load in loads])
                 path = (arm.angle(loads, still[:, 1:][:, judged])
                         - arm.angle(loads, moving[None, 1:][:, judged]))
-            formation = elongations(1.0, moving, scale) - scale * moving
-            yield tension[1:][judged], path, formation[1:][judged]
+            yield tension[1:][judged], path
 
 
 class _Statics:
@@ -126,12 +116,11 @@ class _Statics:
             statics = effect.forward(statics, geometry)
         self.tension = force = np.maximum(statics.moment, 0.0) / (
             geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6))
-        # What H2 feels, by how much its loop is wider, and the factor on the strain.
-        self.load = chain.load_inside(force)
-        self.width, self.scale = chain.loop_width(force), chain.scale(force)
+        # What H2 feels, and by how much its loop is wider.
+        self.load, self.width = chain.load_inside(force), chain.loop_width(force)
         base = model.require_length_stage().output_range[0]
         self._demand = np.maximum.accumulate(
-            (statics.length - base - chain.stretch(force)) / self.scale)
+            (statics.length - base - chain.stretch(force)) / chain.scale(force))
         self._by_load = np.argsort(self.load, kind='stable')
 
     def loads_between(self, low: float, high: float) -> np.ndarray:
