@@ -18,6 +18,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis import events, significance, verdict
+from hysteresis_ros.diagnosis.kept_strain import kept_strain
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.residual import unexplained_signal
 from hysteresis_ros.diagnosis.selection import Selection
@@ -100,7 +101,8 @@ class _Verdict:
             effects=effects, rmse_before=before, rmse_after=after, not_excited=unobservable,
             event=happened, resembles=resembles, uneven=unknown and self.sets.uneven(chosen),
             signal=unexplained_signal(problem, problem.measured - self.sets.fits[
-                chosen].predicted) if unknown else '')
+                chosen].predicted) if unknown else '',
+            kept_strain=None if unknown else kept_strain(selection, self.sets.fits[chosen]))
 
     def _in_order(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return effects, that first which explains most by itself."""

@@ -83,6 +83,9 @@ class Diagnosis(Result):
         not chosen by it. None on an arm.
     small_error : float or None
         On a bench the error below which none matters; None on an arm.
+    kept_strain : dict or None
+        What martensite that keeps strain would explain of the error that is left, which no bench
+        of constant loads shows and `structural_error` counts; see `diagnosis.kept_strain`.
     """
 
     verdict: str
@@ -109,6 +112,7 @@ class Diagnosis(Result):
     pooled_before: float | None = None
     pooled_after: float | None = None
     small_error: float | None = None
+    kept_strain: dict[str, Any] | None = None
 
     @property
     def error_name(self) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.model.loads import uncovered_load
 
 if TYPE_CHECKING:
@@ -30,6 +31,23 @@ def verdict_in_words(found: Diagnosis) -> str:
     str
         One paragraph.
     """
+    return ' '.join(filter(None, (_verdict(found), kept_in_words(found))))
+
+
+def kept_in_words(found: Diagnosis) -> str:
+    """Say what martensite that keeps strain would explain, '' where that is not much."""
+    kept = found.kept_strain
+    if kept is None:
+        return ''
+    unit, scale = shown(found.quantity)
+    before, after = (f'{scale * kept[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
+    return (f'Of the {before} {unit} that are left, the wire itself may be to blame, in a way that '
+            'no bench of constant loads shows: martensite that keeps '
+            f'{100.0 * kept["kept"]:.0f} % of its strain would leave {after} {unit}; `extend --add '
+            f'{kept["effect"]}` adds it.')
+
+
+def _verdict(found: Diagnosis) -> str:
     effects = catalogue()
     if found.verdict == 'missing':
         parts = []

@@ -1,0 +1,66 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis says of martensite that keeps strain, which no constant load shows."""
+
+from model_support import bicep_model, effect_of, runs, with_noise
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.report.words import verdict_in_words
+
+TRIED = ['payload_error', 'encoder_offset', 'end_stop']
+NOISE = 3e-4
+
+
+@pytest.fixture(scope='module')
+def model():
+    """Return a model whose strain grows with the load, and which is right on its bench."""
+    made = bicep_model()
+    return made.with_effects([effect_of(made, 'stress_dependent_strain', r=0.6, F0=1.2)])
+
+
+def diagnosis_of(model, *effects, tried=TRIED, rows=30):
+    """Return the diagnosis of a recording in which more effects act than the model has."""
+    truth = model.with_effects([*model.effects, *effects])
+    recording = runs(truth, rows=rows)
+    noise = NOISE * np.random.default_rng(4).standard_normal(recording.rows)
+    return diagnose(model, [with_noise(recording, noise)], tried)
+
+
+def test_a_wire_that_keeps_strain_is_no_fault_of_the_arm_but_said(model):
+    found = diagnosis_of(model, effect_of(model, 'formation_memory', kept=0.8))
+    assert (found.verdict, found.missing) == ('adequate', [])
+    kept = found.to_dict()['kept_strain']
+    assert kept['effect'] == 'formation_memory'
+    assert kept['kept'] == pytest.approx(0.8, abs=0.05)
+    assert kept['rmse_before'] > 5e-3 > 5.0 * NOISE > kept['rmse_after']
+    assert f'keeps {100.0 * kept["kept"]:.0f} % of its strain' in verdict_in_words(found)
+
+
+def test_it_is_said_besides_what_is_missing(model):
+    found = diagnosis_of(model, effect_of(model, 'formation_memory', kept=0.8),
+                         effect_of(model, 'payload_error', dm=40.0))
+    assert found.missing == ['payload_error']
+    assert found.kept_strain['kept'] == pytest.approx(0.8, abs=0.1)
+    assert found.effects[0].values['dm'] == pytest.approx(40.0, abs=4.0)
+
+
+@pytest.mark.parametrize('name, values', [
+    ('payload_error', {'dm': 40.0}), ('encoder_offset', {'offset': 3.0})])
+def test_nothing_is_said_of_a_wire_that_keeps_nothing(model, name, values):
+    found = diagnosis_of(model, effect_of(model, name, **values))
+    assert found.missing == [name] and found.kept_strain is None
+    assert diagnosis_of(model).kept_strain is None
+
+
+def test_nothing_is_said_where_the_strain_does_not_grow_with_the_load():
+    found = diagnosis_of(bicep_model())
+    assert found.verdict == 'adequate' and found.kept_strain is None
+
+
+def test_where_it_is_tried_by_name_the_sets_say_it(model):
+    found = diagnosis_of(model, effect_of(model, 'formation_memory', kept=0.8),
+                         tried=[*TRIED, 'formation_memory'])
+    assert found.kept_strain is None
+    assert found.ranking[0]['effect'] == 'formation_memory'
