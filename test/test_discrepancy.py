@@ -83,11 +83,31 @@ def test_what_martensite_may_keep_of_its_load_is_an_error_of_all_rows_together(n
     half, all_kept = (problem.simulate([growth, effect_of(model, 'formation_memory', kept=kept)])
                       - problem.simulate([growth]) for kept in (0.5, 1.0))
     assert np.std(all_kept) > 1e-3
-    assert found.common == pytest.approx(all_kept[:, None] / np.sqrt(3.0))
+    assert found.kept == pytest.approx(all_kept) and found.common.size == 0
+    assert found.matrix() - found.matrix(kept=False) == pytest.approx(
+        np.outer(all_kept, all_kept) / 3.0)
     assert half == pytest.approx(0.5 * all_kept, abs=0.1 * np.abs(all_kept).max())
     known = discrepancy.discrepancy_along(
         problem, [growth], problem.simulate([growth]), Settings(), ['formation_memory'])
-    assert found.parts == pytest.approx(known.parts) and known.common.size == 0
+    assert found.parts == pytest.approx(known.parts) and not np.any(known.kept)
+    assert found.size ** 2 - known.size ** 2 == pytest.approx(np.mean(all_kept ** 2) / 3.0)
+    assert found.size_besides_kept == known.size
+
+
+def test_what_is_left_besides_kept_strain_lacks_a_share_from_none_to_all():
+    model = bicep_model()
+    growth = effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)
+    problem = problem_for(model.with_effects([growth]), [runs(model)])
+    found = discrepancy.discrepancy_along(
+        problem, [growth], problem.simulate([growth]), Settings())
+    other = np.cos(np.arange(len(found.kept)))
+    other -= (found.kept @ other) / (found.kept @ found.kept) * found.kept
+    for share, left in ((0.4, 0.0), (1.5, 0.5), (-0.5, -0.5)):
+        residual = share * found.kept + other
+        assert found.besides_kept(residual) == pytest.approx(left * found.kept + other)
+    plain = problem_for(model, [runs(model)])
+    nothing = discrepancy.discrepancy_along(plain, [], plain.simulate([]), Settings())
+    assert nothing.besides_kept(other) is other
 
 
 @pytest.mark.parametrize('fitted', [True, False])

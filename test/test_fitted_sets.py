@@ -52,12 +52,27 @@ def test_of_each_set_the_most_probable_fit_is_kept(fitter, sets):
 def test_the_error_of_a_set_is_the_smallest_that_was_found(fitter, sets):
     """Also where a smaller one is found after it was asked for, and no larger one counts."""
     sets.keep(fitted(fitter))
-    before = sets.error(NAMES)
-    assert before < 0.01
-    sets.keep_least(NAMES, 0.5 * before)
-    assert sets.error(NAMES) == 0.5 * before
-    sets.keep_least(NAMES, 1.0)
+    before, measured = sets.error(NAMES), fitter.problem.measured
+    assert 0.0 < before < 0.01
+    sets.keep_least(NAMES, measured + 0.5 * before)
+    assert sets.error(NAMES) == pytest.approx(0.5 * before)
+    sets.keep_least(NAMES, measured + 1.0)
     assert sets.error(NAMES) == pytest.approx(fitter.error(sets.fits[NAMES].predicted))
+
+
+def test_what_martensite_keeps_is_no_part_of_the_models_own_error(fitter, sets, monkeypatch):
+    """Whatever its share, and however large it is; of another course nothing is taken off."""
+    course = np.linspace(-1.0, 1.0, len(fitter.problem.measured)) ** 3
+    monkeypatch.setattr(fitter.covariance, 'discrepancy', dataclasses.replace(
+        fitter.covariance.discrepancy, kept=course))
+    sets.keep(fitted(fitter))
+    sets.keep_least(NAMES, fitter.problem.measured - 0.7 * course)
+    assert sets.own_error(NAMES) == pytest.approx(0.0, abs=1e-12)
+    monkeypatch.setattr(fitter.covariance, 'discrepancy', dataclasses.replace(
+        fitter.covariance.discrepancy, kept=np.zeros(len(course))))
+    other = FittedSets(fitter, Settings(), np.random.default_rng(0))
+    other.keep(fitted(fitter))
+    assert other.own_error(NAMES) == other.error(NAMES) > 1e-5
 
 
 def test_fits_are_judged_anew_with_each_covariance_that_is_added(fitter, sets):

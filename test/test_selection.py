@@ -103,7 +103,7 @@ def test_what_an_effect_makes_uncertain_counts_as_far_as_it_explains_more(payloa
     monkeypatch.setattr(sets, '_largest_errors', {})
     monkeypatch.setattr(sets, '_largest_error', lambda covariance: own)
     errors = {frozenset(): np.sqrt(1.0 + explained * further), names: 1.0}
-    monkeypatch.setattr(sets, 'error', lambda one: errors[one])
+    monkeypatch.setattr(sets, 'own_error', lambda one: errors[one])
     counts = {0.0: 0.0, 0.5: 0.125, 1.0: 0.25, 2.0: 0.5, 50.0: 0.98}[explained]
     limit = np.sqrt(sets.rmse_95 ** 2 + counts * further)
     for share, enough in ((0.999, True), (1.001, False)):

@@ -377,14 +377,15 @@ class Fitter:
             found, log_evidence=fit.log_evidence, values=fit.values,
             spread=fit.spread * np.outer(wider, wider))
 
-    def least_error(self, fit: Fit) -> float:
-        """Return the root mean square error after one step towards the least squares."""
+    def towards_least(self, fit: Fit) -> np.ndarray:
+        """Return the response (n,), linearised, after one step towards the least squares."""
         if not len(fit.vector):
-            return self.error(fit.predicted)
+            return fit.predicted
         walk = _Walk(fit.effects, self.problem.kind)
         walk.vector = fit.vector
         step = self._step(fit, walk, np.ones(len(fit.predicted), dtype=bool))
-        return min(self.error(fit.predicted), self.error(fit.predicted + fit.jacobian @ step))
+        response: np.ndarray = fit.predicted + fit.jacobian @ step
+        return response
 
     def with_intervals(self, fit: Fit, factor: float = FACTOR) -> list[Effect]:
         """Return the fitted effects with 95 % intervals of their parameters."""

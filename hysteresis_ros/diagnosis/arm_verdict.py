@@ -93,7 +93,7 @@ class _Verdict:
             alternatives=[alternatives[name] for name in missing],
             ranking=self._ranking(missing, before), sets=self._sets(shares),
             noise_floor=self.sets.fits[chosen].noise,
-            structural_error=selection.covariance.size,
+            structural_error=selection.covariance.discrepancy.size,
             unexplained=self._unexplained(chosen),
             experiment=verdict.next_experiment(
                 kind, missing or resembles, [alternatives[name] for name in missing],
@@ -162,7 +162,7 @@ class _Verdict:
     def _unexplained(self, chosen: frozenset[str]) -> float:
         """Share of the first mean square that neither set nor base model nor noise explains."""
         beyond = self.sets.noise_free_rmse(chosen) ** 2 - self.sets.rmse_95 ** 2
-        first = self.sets.error(frozenset()) ** 2
+        first = self.sets.own_error(frozenset()) ** 2
         return float(np.clip(beyond / max(first, 1e-300), 0.0, 1.0))
 
     def _alternatives(self, chosen: frozenset[str], valid: Sequence[frozenset[str]]

@@ -113,20 +113,21 @@ class Covariance:
 
     Attributes
     ----------
+    discrepancy : Discrepancy
     size : float
-        Root mean square of the discrepancy.
+        Root mean square of the discrepancy, but for what martensite keeps: that has one course.
     points : list of Point
         Covariances at hand; see `add`.
     """
 
     def __init__(self, discrepancy: Discrepancy, clock: np.ndarray, trial: np.ndarray,
                  resolution: float, largest_noise: float, scale_spread: float) -> None:
-        self._discrepancy = discrepancy
+        self.discrepancy = discrepancy
         edges = [0, *(np.flatnonzero(np.diff(trial)) + 1).tolist(), len(trial)]
         self._trials = [slice(*pair) for pair in zip(edges, edges[1:])]
         self._gaps = [np.abs(clock[own, None] - clock[own]) for own in self._trials]
         self._spread = scale_spread
-        self.size = discrepancy.size
+        self.size = discrepancy.size_besides_kept
         span = max(*(float(np.max(gaps)) for gaps in self._gaps), _TINY)
         steps = np.diff(clock)[np.diff(trial) == 0]
         shortest = max(float(np.median(steps)), 1e-9 * span) if len(steps) else span
@@ -143,7 +144,7 @@ class Covariance:
     def of(self, discrepancy: Discrepancy) -> Covariance:
         """Return covariances with another discrepancy, and none at hand."""
         other = copy.copy(self)
-        other._discrepancy, other.points = discrepancy, []
+        other.discrepancy, other.points = discrepancy, []
         return other
 
     def start(self, drift: float = 0.1, noise: float = 0.0) -> np.ndarray:
@@ -188,7 +189,7 @@ class Covariance:
 
     def points_at(self, several: Iterable[np.ndarray]) -> Iterator[Point]:
         """Iterate over the covariances for several values (4,); see `point`."""
-        matrix = self._discrepancy.matrix()
+        matrix = self.discrepancy.matrix()
         for values in several:
             total = self._parts(values, matrix)[2]
             factor = linalg.cholesky(total, lower=True, check_finite=False)
@@ -208,7 +209,8 @@ class Covariance:
         self.points.append(found)
         return found
 
-    def largest_error(self, rng: np.random.Generator, count: int, level: float = 0.95) -> float:
+    def largest_error(self, rng: np.random.Generator, count: int, level: float = 0.95,
+                      kept: bool = True) -> float:
         """
         Return the root mean square error that the discrepancy stays below, at a probability.
 
@@ -219,13 +221,15 @@ class Covariance:
             Number of draws.
         level : float
             The probability.
+        kept : bool
+            Whether what martensite keeps counts.
 
         Returns
         -------
         float
             In the unit of the response.
         """
-        values, vectors = linalg.eigh(self._discrepancy.matrix())
+        values, vectors = linalg.eigh(self.discrepancy.matrix(kept))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         draws = root @ rng.standard_normal((len(values), count))
         scale = np.exp(self._spread * rng.standard_normal(count))
@@ -251,7 +255,7 @@ class Covariance:
         share = float(np.sqrt(np.mean(residual ** 2))) / self._scale
         starts = [self.start(0.1, share), self.start(share, 0.1)] if values is None else [
             np.clip(values, self._low, self._high)]
-        matrix = self._discrepancy.matrix()
+        matrix = self.discrepancy.matrix()
         from scipy import optimize     # a third of a second that bench tables do not need
         with np.errstate(all='ignore'):
             found = [optimize.minimize(

@@ -66,24 +66,41 @@ class Discrepancy:
         Where each row lies, in units of the length over which errors change.
     common : ndarray, shape (n, q)
         Errors of which each acts in all rows together, by one standard deviation.
+    kept : ndarray, shape (n,)
+        What the response would change by if martensite kept all of its strain. A share of it, from
+        none to all, is an error of all rows together.
     """
 
     parts: np.ndarray
     places: np.ndarray
     common: np.ndarray
+    kept: np.ndarray
 
     @property
     def size(self) -> float:
         """Root mean square, in the unit of the response."""
+        return float(np.hypot(self.size_besides_kept, KEPT * np.sqrt(np.mean(self.kept ** 2))))
+
+    @property
+    def size_besides_kept(self) -> float:
+        """Root mean square without what martensite keeps, in the unit of the response."""
         return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1)
                                      + np.sum(self.common ** 2, axis=1))))
 
-    def matrix(self) -> np.ndarray:
-        """Return the covariance, shape (n, n)."""
+    def besides_kept(self, residual: np.ndarray) -> np.ndarray:
+        """Return a residual (n,) without the share of `kept` that explains most of it."""
+        square = float(self.kept @ self.kept)
+        if square == 0.0:
+            return residual
+        return residual - np.clip(self.kept @ residual / square, 0.0, 1.0) * self.kept
+
+    def matrix(self, kept: bool = True) -> np.ndarray:
+        """Return the covariance, shape (n, n); without what martensite keeps if not `kept`."""
         squares = np.sum(self.places ** 2, axis=1)
         gaps = squares[:, None] + squares[None, :] - 2.0 * self.places @ self.places.T
-        return (self.common @ self.common.T
-                + (self.parts @ self.parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0)))
+        known = (self.common @ self.common.T
+                 + (self.parts @ self.parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0)))
+        return known + KEPT ** 2 * np.outer(self.kept, self.kept) if kept else known
 
 
 class Offset(MaterialEffect):
@@ -193,13 +210,12 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
     bench = gain * length_errors(problem.model, history.load) / math.sqrt(1.0 + DIRECTIONAL ** 2)
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
-    common = [left_out_changes(problem, effects)]
-    if FormationMemory.id not in {*tried, *(effect.id for effect in effects)}:
-        common.append(KEPT * formation_change(problem, effects))
+    known = FormationMemory.id in {*tried, *(effect.id for effect in effects)}
     return Discrepancy(
         np.column_stack([bench, DIRECTIONAL * direction * bench, history.path]),
         np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])
-        / settings.correlation, np.column_stack(common))
+        / settings.correlation, left_out_changes(problem, effects),
+        np.zeros(len(predicted)) if known else formation_change(problem, effects))
 
 
 def formation_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

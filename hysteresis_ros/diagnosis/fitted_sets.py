@@ -43,8 +43,8 @@ class FittedSets:
     p_values : dict of str to float
         Of single effects, over all of them; those that are missing are taken for 1.
     rmse_95 : float
-        Root mean square that the base model's own error stays below at 95 %, in the unit of the
-        response.
+        Root mean square that the base model's own error stays below at 95 %, but for what
+        martensite keeps, in the unit of the response.
     odds : float
         Logarithm of the odds that an effect acts, before any data.
     temper : float
@@ -58,10 +58,10 @@ class FittedSets:
         self.p_values: dict[str, float] = {}
         self.odds = math.log(settings.prior / (1.0 - settings.prior))
         self.temper = 1.0 + len(self.problem.measured) / settings.coarsening
-        # Smallest that were found, by least squares.
-        self._least_errors: dict[frozenset[str], float] = {}
+        # By least squares.
+        self._least: dict[frozenset[str], np.ndarray] = {}
         # Each with the response that it belongs to.
-        self._errors: dict[frozenset[str], tuple[np.ndarray, float]] = {}
+        self._errors: dict[frozenset[str], tuple[np.ndarray, float, float]] = {}
         self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         # Of its own, or all other draws would depend on whether this one is needed.
         self._noise_rng, = rng.spawn(1)
@@ -85,9 +85,9 @@ class FittedSets:
         """Judge all fits under the covariances that are at hand now."""
         self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
 
-    def keep_least(self, names: frozenset[str], error: float) -> None:
-        """Keep the smallest error of a set, in the unit of the response."""
-        self._least_errors[names] = error
+    def keep_least(self, names: frozenset[str], predicted: np.ndarray) -> None:
+        """Keep the response (n,) of a set that was fitted by least squares."""
+        self._least[names] = predicted
         self._errors.pop(names, None)
 
     def log_posterior(self, names: frozenset[str]) -> float:
@@ -123,24 +123,38 @@ class FittedSets:
         KeyError
             If the set was not fitted.
         """
+        return self._errors_of(names)[1]
+
+    def own_error(self, names: frozenset[str]) -> float:
+        """
+        Return the RMSE of a set without the share that what martensite keeps can explain.
+
+        What is kept is known but for that share, so that it hides nothing of another course: the
+        base model may be wrong by much and still miss nothing by little.
+        """
+        return self._errors_of(names)[2]
+
+    def _errors_of(self, names: frozenset[str]) -> tuple[np.ndarray, float, float]:
+        """Return the response of a set with its smallest `error` and `own_error`."""
         fit = self.fits[names]
         known = self._errors.get(names)
         if known is None or known[0] is not fit.predicted:
-            least = self._least_errors.get(names)
-            found = (self.fitter.least_error(fit) if least is None
-                     else min(least, self.fitter.error(fit.predicted)))
-            self._errors[names] = known = (fit.predicted, found)
-        return known[1]
+            least = self._least[names] if names in self._least else self.fitter.towards_least(fit)
+            residuals = [self.problem.measured - one for one in (fit.predicted, least)]
+            own = map((fit.covariance or self.covariance).discrepancy.besides_kept, residuals)
+            self._errors[names] = known = (
+                fit.predicted, min(map(_rms, residuals)), min(map(_rms, own)))
+        return known
 
     def noise_free_rmse(self, names: frozenset[str]) -> float:
         """
-        Return the root mean square of a set's residual without white noise.
+        Return the root mean square of a set's residual without white noise, as `own_error`.
 
         What is larger than the base model's own error could be, and not as large at all times, is
         no noise: it has a cause.
         """
         noise = 0.0 if self.uneven(names) else self.fits[names].noise
-        return math.sqrt(max(self.error(names) ** 2 - noise ** 2, 0.0))
+        return math.sqrt(max(self.own_error(names) ** 2 - noise ** 2, 0.0))
 
     def uneven(self, names: frozenset[str]) -> bool:
         """Whether a set's residual looks like noise, but has a cause: see `noise_free_rmse`."""
@@ -177,7 +191,7 @@ class FittedSets:
         known = self._largest_errors.get(names)
         if known is None or known[0] is not covariance:
             self._largest_errors[names] = known = (covariance, self._largest_error(covariance))
-        explained = self.error(frozenset()) ** 2 - self.error(names) ** 2
+        explained = self.own_error(frozenset()) ** 2 - self.own_error(names) ** 2
         further = known[1] ** 2 - self.rmse_95 ** 2
         if further > 0.0:
             # The share beyond doubt, as James and Stein shrink an estimate by it. From half of what
@@ -189,8 +203,9 @@ class FittedSets:
         return math.sqrt(self.rmse_95 ** 2 + further)
 
     def _largest_error(self, covariance: Covariance) -> float:
-        """Return the root mean square that a discrepancy stays below at 95 %."""
-        return covariance.largest_error(np.random.default_rng(self._seed), self.settings.draws)
+        """Return the root mean square that a discrepancy stays below at 95 %; see `own_error`."""
+        return covariance.largest_error(
+            np.random.default_rng(self._seed), self.settings.draws, kept=False)
 
     def valid(self) -> list[frozenset[str]]:
         """
@@ -209,13 +224,13 @@ class FittedSets:
                 and not self._surpassed(names, physical)]
 
     def _each_matters(self, names: frozenset[str]) -> bool:
-        error = self.error(names)
+        error = self.own_error(names)
         for without in subsets(names):
             if without not in self.fits:
                 continue
-            before = self.error(without)
+            before = self.own_error(without)
             least = max(self.settings.practical * before,
-                        LEAST_SHARE * self.error(frozenset()))
+                        LEAST_SHARE * self.own_error(frozenset()))
             if (before - error < least or before ** 2 - error ** 2 < self.covariance.size ** 2
                     or (without and self._would_do(without, names))):
                 return False
@@ -223,9 +238,9 @@ class FittedSets:
 
     def _surpassed(self, names: frozenset[str], others: Iterable[frozenset[str]]) -> bool:
         """Whether another set of as few effects predicts far better."""
-        form = self.settings.form * self.error(frozenset())
-        least = self.error(names) ** 2 - self.covariance.size ** 2 - form ** 2
-        return least > 0.0 and any(self.error(other) ** 2 < least for other in others
+        form = self.settings.form * self.own_error(frozenset())
+        least = self.own_error(names) ** 2 - self.covariance.size ** 2 - form ** 2
+        return least > 0.0 and any(self.own_error(other) ** 2 < least for other in others
                                    if 0 < len(other) <= len(names))
 
     def _would_do(self, without: frozenset[str], names: frozenset[str]) -> bool:
@@ -241,6 +256,10 @@ class FittedSets:
         if self.noise_free_rmse(without) > self.rmse_95 >= self.noise_free_rmse(names):
             return odds < 0.0
         return odds < -math.log(self.settings.reported)
+
+
+def _rms(residual: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(residual ** 2)))
 
 
 def subsets(names: frozenset[str]) -> list[frozenset[str]]:

@@ -163,7 +163,8 @@ class Selection:
         if best is None or self.sets.noise_free_rmse(best) > self.sets.rmse_95:
             return self._ranked_of(size)
         # What a further effect explains has to exceed the base model's own error.
-        if not best or self.sets.error(best) <= self.covariance.size or not self._promising(best):
+        if (not best or self.sets.own_error(best) <= self.covariance.size
+                or not self._promising(best)):
             return []
         if size == 1:
             return self._ranked_of(size)
@@ -331,7 +332,7 @@ class Selection:
             self._refined.add(names)
             self.sets.fits[names] = self.fitter.refined(self.sets.fits[names])
             least = self.fitter.least_squares(self.sets.fits[names])
-            self.sets.keep_least(names, self.fitter.error(least.predicted))
+            self.sets.keep_least(names, least.predicted)
             # Under a covariance the way to the maximum is rough, and not under white noise.
             self.sets.keep(self.fitter.polished(self.fitter.along(least)))
         self.sets.judge_all()
