@@ -3,28 +3,27 @@
 """
 Select the set of effects that explains bench tables, by rows that were held out.
 
-A bench table is where H2's weights come from, so that every set gets weights of its own. These
-are not negative, which no Gaussian evidence knows; what a set predicts of trials that neither it
-nor its weights have seen takes the evidence's place.
+`bench_search` finds the sets that are compared here. A bench table is where H2's weights come
+from, so that every set gets weights of its own. These are not negative, which no Gaussian evidence
+knows; what a set predicts of trials that neither it nor its weights have seen takes the evidence's
+place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 import math
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.bench_search import all_help, BenchSearch, says_more
 from hysteresis_ros.diagnosis.determined import not_determined
-from hysteresis_ros.diagnosis.forms import other_forms
-from hysteresis_ros.diagnosis.observable import observable, present
-from hysteresis_ros.diagnosis.parameters import usual
-from hysteresis_ros.effects import catalogue, Effect
-from hysteresis_ros.workers import delayed, in_parallel
+from hysteresis_ros.diagnosis.observable import observable
+from hysteresis_ros.effects import catalogue
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.bench_problem import BenchProblem
@@ -36,10 +35,6 @@ SIGNIFICANCE = 0.05
 CONSISTENT = 0.55
 # Share of the response's range below which an error does not matter.
 SMALL_ERROR = 0.01
-# Sets of each size that are grown by one more effect, and judged on held-out rows.
-GROWN = 3
-# Share by which an effect has to lower the error of the rows that its set is fitted to.
-WORTH_JUDGING = 0.01
 # Share of the loads on which an effect has to be named again, at least, with that load left out.
 NAMED_AGAIN = 0.5
 
@@ -82,10 +77,11 @@ class BenchSelection:
     def __init__(self, problem: BenchProblem, settings: Settings, rng: np.random.Generator,
                  jobs: int, progress: Progress) -> None:
         self.problem, self.settings = problem.finer(), settings
-        self._search, self.fitter = BenchFitter(problem), BenchFitter(self.problem)
-        self._rng, self._jobs, self._progress = rng, jobs, progress
+        self.fitter, self._rng = BenchFitter(self.problem), rng
         self.base = self.found = self.fitter.cross_validate(self.fitter.fit([]))
         self.names, self.unobservable = observable(problem)
+        self._search = BenchSearch(problem, self.fitter, self.names, settings.most_on_bench, jobs,
+                                   progress)
         self.unstable: dict[str, str] = {}
         self.alone: list[Fit] = []
         self.sets: list[Fit] = []
@@ -97,9 +93,7 @@ class BenchSelection:
 
     def run(self) -> None:
         """Fit every effect by itself, grow sets from the best, and compare what they predict."""
-        fits = self._begun_where_larger_ended(
-            self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
-        self.tried = self._judge(fits, self._in_other_forms(fits))
+        self.tried = self._judge(*self._search.run())
         self.alone = sorted((fit for fit in self.tried if len(fit.effects) == 1), key=self.error)
         values = self._significance(self.tried, self.base)
         self.p_values = {fit.names: float(value) for fit, value in zip(self.tried, values)}
@@ -132,38 +126,6 @@ class BenchSelection:
         return max((fit for fit in fits if self.typical_error(fit) <= largest),
                    key=lambda fit: self._fitted_log_odds(fit, self.base))
 
-    def _begun_where_larger_ended(self, fits: Sequence[Fit]) -> list[Fit]:
-        """
-        Return fits, again from the values that a larger set has found if that had less error.
-
-        What the larger set adds may do nothing but lead out of a local minimum.
-        """
-        found = {frozenset(fit.names): fit for fit in fits}
-        errors = {names: self.fitter.error(fit.predicted) for names, fit in found.items()}
-        starts = []
-        for names in found:
-            larger = [other for other in found if names < other
-                      and errors[other] < (1.0 - WORTH_JUDGING) * errors[names]]
-            if larger:
-                ended = found[min(larger, key=lambda one: errors[one])]
-                starts.append([effect for effect in ended.effects if effect.id in names])
-        for fit in self._in_parallel(_fitted, self.fitter, starts):
-            names = frozenset(fit.names)
-            if self.fitter.error(fit.predicted) < errors[names]:
-                found[names] = fit
-        return list(found.values())
-
-    def _in_other_forms(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Return the best fit of each size in the other forms that its effects can have."""
-        best: dict[int, Fit] = {}
-        for fit in sorted(fits, key=lambda one: self.fitter.error(one.predicted)):
-            if other_forms(fit.effects):
-                best.setdefault(len(fit.effects), fit)
-        return self._in_parallel(_fitted, self.fitter, [
-            [usual([effect], self.problem.kind)[0].with_values(**forms[effect.id])
-             if effect.id in forms else effect for effect in fit.effects]
-            for fit in best.values() for forms in other_forms(fit.effects)])
-
     def _judge(self, fits: Sequence[Fit], variants: Sequence[Fit]) -> list[Fit]:
         """
         Return fits that could be an answer, and single effects, with their held-out rows.
@@ -171,67 +133,16 @@ class BenchSelection:
         Those with another form of an equation only where held-out rows ask for it.
         """
         errors = {frozenset(fit.names): self.fitter.error(fit.predicted) for fit in fits}
-        found = {fit.names: fit for fit in self._in_parallel(_judged, self.fitter, [
+        found = {fit.names: fit for fit in self._search.cross_validated([
             fit for fit in fits if len(fit.effects) == 1
-            or self._all_help(fit, errors) and _says_more(fit)])}
-        for fit in self._in_parallel(_judged, self.fitter, [
-                fit for fit in variants if _says_more(fit) and self._determines(fit)]):
+            or all_help(fit, errors) and says_more(fit)])}
+        for fit in self._search.cross_validated([
+                fit for fit in variants if says_more(fit) and self._determines(fit)]):
             simpler = found.get(fit.names)
             if simpler is None or simpler.implausible() or self.typical_error(fit) < (
                     1.0 - self.settings.practical) * self.typical_error(simpler):
                 found[fit.names] = fit
         return list(found.values())
-
-    def _grown(self) -> list[Fit]:
-        """
-        Return all single effects and the best larger sets, fitted, not cross-validated.
-
-        An effect need not help by itself: the paper's first stage already does a part of what a
-        load does, so that one effect of the load alone may well make it worse. What every loaded
-        muscle has is therefore grown from, too.
-        """
-        singles = self._in_parallel(_alone, self._search, self.names)
-        found = list(singles)
-        single = {fit.names[0]: fit.effects[0] for fit in singles}
-        generation = self._best(singles, GROWN)
-        errors = {frozenset(fit.names): self._fitted_error(fit) for fit in singles}
-        for _ in range(1, self.settings.most_on_bench):
-            larger = {frozenset((*fit.names, name)): [*fit.effects, effect]
-                      for fit in generation for name, effect in single.items()
-                      if name not in fit.names}
-            begun = self._in_parallel(_begun, self._search, [
-                effects for effects in larger.values() if not _replaced(effects)])
-            # What every loaded muscle has, and one effect more, may well begin worse than it ends.
-            chosen = self._best(begun, 2 * GROWN)
-            chosen += [fit for fit in begun if fit not in chosen and _but_one_universal(fit)]
-            fitted = self._in_parallel(_fitted, self._search, [fit.effects for fit in chosen])
-            generation = self._best(fitted, GROWN)
-            errors.update((frozenset(fit.names), self._fitted_error(fit)) for fit in fitted)
-            # On the coarse grid a loop's width hides what an effect of the load does.
-            found += [fit for fit in fitted if _but_one_universal(fit)
-                      or fit in generation and self._all_help(fit, errors)]
-        return found
-
-    def _best(self, fits: Sequence[Fit], count: int) -> list[Fit]:
-        """Return those with the least errors of fitted rows, and those of universal effects."""
-        order = sorted(fits, key=self._fitted_error)
-        return order[:count] + [fit for fit in order[count:]
-                                if all(effect.universal for effect in fit.effects)]
-
-    def _all_help(self, fit: Fit, errors: Mapping[frozenset[str], float]) -> bool:
-        """
-        Whether no effect can be left out of a set at no cost.
-
-        Of what every loaded muscle has only held-out loads can tell: the weights take up much of
-        it under the loads that they are fitted to.
-        """
-        largest = (1.0 - WORTH_JUDGING) * np.array([
-            errors.get(frozenset(fit.names) - {effect.id}, np.inf) for effect in fit.effects
-            if not effect.universal])
-        return bool(np.all(errors[frozenset(fit.names)] <= largest))
-
-    def _fitted_error(self, fit: Fit) -> float:
-        return self._search.error(fit.predicted)
 
     def _leave_out_chance(self) -> bool:
         """
@@ -330,12 +241,6 @@ class BenchSelection:
         own, others = (np.sqrt(self._squares(fit.held_out) + self.small_error() ** 2)
                        for fit in (self.found, other))
         return float(np.mean(own <= (1.0 + self.settings.practical) * others))
-
-    def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None], fitter: BenchFitter,
-                     items: Sequence) -> list[Fit]:
-        tasks = [delayed(task)(fitter, item) for item in items]
-        results = self._progress(in_parallel(tasks, self._jobs), len(tasks))
-        return [fit for fit in results if fit is not None]
 
     def error(self, fit: Fit) -> float:
         """Return the held-out RMSE of a fit, in the unit of the response."""
@@ -472,65 +377,3 @@ def _cannot_be_determined(name: str, reason: str) -> str:
     """Say why the size of an effect is not known, and what would show it."""
     return (f'cannot be determined here: {reason}; it would be by: '
             f'{catalogue()[name].experiment}')
-
-
-def _but_one_universal(fit: Fit) -> bool:
-    """Whether every loaded muscle has all but one of the effects of a fit."""
-    return sum(not effect.universal for effect in fit.effects) == 1
-
-
-def _replaced(effects: Sequence[Effect]) -> bool:
-    """Whether one of some effects replaces another one."""
-    return any(other.id in effect.replaces for effect in effects for other in effects)
-
-
-def _alone(fitter: BenchFitter, name: str) -> Fit | None:
-    """Fit one effect."""
-    effect = present(fitter.problem.model, catalogue()[name])
-    if not fitter.problem.loads_return:
-        effect = effect.within_trials()
-    with np.errstate(all='ignore'):
-        return _finite(fitter.search([], effect))
-
-
-def _begun(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
-    """Begin to fit effects, the last of them new, from usual values or those that each had."""
-    kind = fitter.problem.kind
-    with np.errstate(all='ignore'):
-        return _finite(fitter.begin([
-            usual(effects, kind), effects, [*effects[:-1], *usual(effects[-1:], kind)]]))
-
-
-def _fitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
-    """Fit some effects from their present values."""
-    with np.errstate(all='ignore'):
-        return _finite(fitter.fit(effects))
-
-
-def _refitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
-    """Fit some effects from their present values, and those that have vanished from usual ones."""
-    kind = fitter.problem.kind
-    return _fitted(fitter, [usual([effect], kind)[0] if _vanished(effect) else effect
-                            for effect in effects])
-
-
-def _judged(fitter: BenchFitter, fit: Fit) -> Fit | None:
-    """Cross-validate a fit."""
-    with np.errstate(all='ignore'):
-        fit = fitter.cross_validate(fit)
-        return fit if np.all(np.isfinite(fit.held_out)) else None
-
-
-def _says_more(fit: Fit) -> bool:
-    """Whether a fit could be an answer, and none of its effects has vanished."""
-    return not fit.implausible() and not any(map(_vanished, fit.effects))
-
-
-def _vanished(effect: Effect) -> bool:
-    """Whether the size of an effect has come out neutral, from where no fit begins."""
-    size = effect.parameters[0]
-    return effect.values[size.name] == size.neutral
-
-
-def _finite(fit: Fit) -> Fit | None:
-    return fit if np.all(np.isfinite(fit.predicted)) else None
