@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a diagnosis says of martensite that keeps strain, which no constant load shows."""
 
+import dataclasses
+
 from model_support import bicep_model, effect_of, runs, with_noise
 import numpy as np
 import pytest
@@ -52,6 +54,17 @@ def test_nothing_is_said_of_a_wire_that_keeps_nothing(model, name, values):
     found = diagnosis_of(model, effect_of(model, name, **values))
     assert found.missing == [name] and found.kept_strain is None
     assert diagnosis_of(model).kept_strain is None
+
+
+@pytest.mark.parametrize('kept', [0.0, 0.8])
+def test_what_a_wire_may_keep_hides_nothing_of_another_course(model, kept):
+    """A play leaves less than what the wire may keep, of which only the share is not known."""
+    exact = dataclasses.replace(model, metrics={'length': {'verification': {'rmse': 1e-4}}})
+    found = diagnosis_of(exact, effect_of(model, 'formation_memory', kept=kept),
+                         effect_of(model, 'backlash', B=1.5), tried=[*TRIED, 'backlash'])
+    assert found.missing == ['backlash']
+    assert found.effects[0].values['B'] == pytest.approx(1.5, abs=0.4)
+    assert kept or found.rmse_before < found.structural_error
 
 
 def test_nothing_is_said_where_the_strain_does_not_grow_with_the_load():
