@@ -170,6 +170,25 @@ def test_a_short_hold_between_long_ones_means_that_the_run_is_not_settled():
     assert settled_rows(Measurement.from_columns(columns)) is None
 
 
+def test_short_holds_on_the_way_from_one_long_hold_to_the_next_are_passed_over():
+    """As with a limited rate, also where they go back and forth: hysteresis forgets it."""
+    columns = staircase([1, 3, 2], 30.0)
+    columns['voltage'][300:350] = np.linspace(1.0, 3.0, 52)[1:-1]
+    columns['voltage'][600:620] = [2.5] * 10 + [2.8] * 10
+    ends = settled_rows(Measurement.from_columns(columns))
+    assert list(ends.column('voltage')) == [1, 3, 2]
+    assert list(ends.time) == pytest.approx([29.9, 59.9, 89.9])
+
+
+@pytest.mark.parametrize('rows, level', [
+    (slice(600, 620), 1.9), (slice(600, 620), 3.1), (slice(5, 20), 0.9), (slice(870, 880), 2.5)])
+def test_a_short_hold_off_the_way_means_that_the_run_is_not_settled(rows, level):
+    """Beyond the hold before or after it, or where no hold comes after it."""
+    columns = staircase([1, 3, 2], 30.0)
+    columns['voltage'][rows] = level
+    assert settled_rows(Measurement.from_columns(columns)) is None
+
+
 def test_a_settled_table_stays_as_it_is():
     table = Measurement.from_columns(arm())
     assert settled_rows(table) is table

@@ -13,6 +13,9 @@ import numpy as np
 if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
 
+# Share of the drive's range that is no change: the board rounds a voltage that is held.
+TOLERANCE = 1e-3
+
 
 def settled_rows(measurement: Measurement, hold: float = SETTLED_HOLD,
                  average: float = 1.0) -> Measurement | None:
@@ -61,20 +64,31 @@ def hold_ends(measurement: Measurement, hold: float = SETTLED_HOLD,
     Returns
     -------
     ndarray of int, shape (holds, 2), or None
-        First row that is averaged and row after the last. None if a hold is shorter, unless it
-        begins or ends its trial, or if there is none.
+        First row that is averaged and row after the last. None if there is none, or if a hold is
+        shorter: unless it begins or ends its trial, or the drive lies on its way from one hold to
+        the next, as with a limited rate. Hysteresis forgets such a way (return-point memory), but
+        not one that goes beyond.
 
     """
-    time = measurement.column('time')
+    time, drive = measurement.column('time'), measurement.column(measurement.drive)
+    band = TOLERANCE * float(np.ptp(drive))
     found = []
     for _, rows in measurement.split():
-        for low, high in holds(measurement.column(measurement.drive), rows):
+        last, lowest, highest = drive[rows.start], np.inf, -np.inf
+        for low, high in holds(drive, rows):
             end = time[high] if high < rows.stop else time[high - 1]
             if end - time[low] >= hold * (1 - 1e-3):
+                if (lowest < min(last, drive[low]) - band
+                        or highest > max(last, drive[low]) + band):
+                    return None
                 begin = np.searchsorted(time[low:high], time[high - 1] - average, side='left')
                 found.append((low + int(begin), high))
+                last, lowest, highest = drive[low], np.inf, -np.inf
             elif low > rows.start and high < rows.stop:
-                return None
+                lowest = min(lowest, float(np.min(drive[low:high])))
+                highest = max(highest, float(np.max(drive[low:high])))
+        if np.isfinite(lowest):
+            return None
     return np.array(found) if found else None
 
 
@@ -96,7 +110,7 @@ def mean_of_windows(values: np.ndarray, windows: np.ndarray) -> np.ndarray:
     return np.array([values[low:high].mean() for low, high in windows])
 
 
-def holds(drive: np.ndarray, rows: slice, tolerance: float = 1e-3) -> list[tuple[int, int]]:
+def holds(drive: np.ndarray, rows: slice, tolerance: float = TOLERANCE) -> list[tuple[int, int]]:
     """
     Divide a trial into stretches in which the drive stays where it was when each began.
 
