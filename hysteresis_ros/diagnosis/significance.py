@@ -113,7 +113,8 @@ def typical_rmse(squares: np.ndarray, small: float) -> np.ndarray:
     ndarray, shape (...)
         Between the least and the largest RMSE of the folds.
     """
-    mean = np.exp(np.mean(np.log(squares + small ** 2), axis=-1))
+    with np.errstate(divide='ignore'):    # a fold without any error leaves none
+        mean = np.exp(np.mean(np.log(squares + small ** 2), axis=-1))
     return np.sqrt(np.maximum(mean - small ** 2, 0.0))
 
 
