@@ -37,6 +37,7 @@ def test_a_wire_that_keeps_strain_is_no_fault_of_the_arm_but_said(model):
     assert kept['effect'] == 'formation_memory'
     assert kept['kept'] == pytest.approx(0.8, abs=0.05)
     assert kept['rmse_before'] > 5e-3 > 5.0 * NOISE > kept['rmse_after']
+    assert 'extend --add formation_memory' in found.experiment
     assert f'keeps {100.0 * kept["kept"]:.0f} % of its strain' in verdict_in_words(found)
 
 

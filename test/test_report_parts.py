@@ -98,10 +98,17 @@ def test_a_tied_effect_is_no_rival():
     assert why_not_another(found, 'angle').startswith('slack comes next')
 
 
-@pytest.mark.parametrize('changes, command', [
-    (ALONE, 'extend'), ({}, 'diagnose'), ({'verdict': 'adequate', 'missing': []}, 'compare'),
-    ({'verdict': 'unknown', 'missing': []}, 'diagnose')])
-def test_the_next_command_is_one_that_the_command_line_takes(changes, command):
+KEPT = {'effect': 'formation_memory', 'kept': 0.9, 'rmse_before': 0.02, 'rmse_after': 0.005}
+
+
+@pytest.mark.parametrize('changes, command, added', [
+    (ALONE, 'extend', 'payload_error'), ({}, 'diagnose', None),
+    ({'verdict': 'adequate', 'missing': [], 'alternatives': []}, 'compare', None),
+    ({'verdict': 'adequate', 'missing': [], 'alternatives': [], 'kept_strain': KEPT}, 'extend',
+     'formation_memory'),
+    ({**ALONE, 'kept_strain': KEPT}, 'extend', 'payload_error'),
+    ({'verdict': 'unknown', 'missing': []}, 'diagnose', None)])
+def test_the_next_command_is_one_that_the_command_line_takes(changes, command, added):
     reading = ('--namespace', '/left', '--columns', 'angle=theta:deg', '--settled')
     text = after_diagnosis(diagnosis(**changes), 'my model.yaml', ['a b.csv'],
                            Origin('', reading))
@@ -111,7 +118,7 @@ def test_the_next_command_is_one_that_the_command_line_takes(changes, command):
     assert args.model == 'my model.yaml' and args.settled and args.namespace == '/left'
     assert 'NEW.csv' in words and ('a b.csv' in words) is (command != 'compare')
     if command == 'extend':
-        assert args.add == 'payload_error' and args.test == ['NEW.csv']
+        assert args.add == added and args.test == ['NEW.csv']
 
 
 def test_other_pages_have_their_next_command_too():

@@ -87,6 +87,8 @@ class _Verdict:
         before, after = (self.fitter.error(fit.held_out) for fit in fits)
         effects = self._in_order(self.fitter.with_intervals(self.sets.fits[chosen]))
         missing = [effect.id for effect in effects]
+        kept = None if unknown else kept_strain(selection, self.sets.fits[chosen])
+        to_add = missing or resembles or ([kept['effect']] if kept else [])
         happened = event if unknown and event_log > self._log_mass(valid) else None
         return verdict.Diagnosis(
             verdict=kind, missing=missing,
@@ -96,13 +98,12 @@ class _Verdict:
             structural_error=selection.covariance.discrepancy.size,
             unexplained=self._unexplained(chosen),
             experiment=verdict.next_experiment(
-                kind, missing or resembles, [alternatives[name] for name in missing],
-                unobservable),
+                kind, to_add, [alternatives[name] for name in missing], unobservable),
             effects=effects, rmse_before=before, rmse_after=after, not_excited=unobservable,
             event=happened, resembles=resembles, uneven=unknown and self.sets.uneven(chosen),
             signal=unexplained_signal(problem, problem.measured - self.sets.fits[
                 chosen].predicted) if unknown else '',
-            kept_strain=None if unknown else kept_strain(selection, self.sets.fits[chosen]))
+            kept_strain=kept)
 
     def _in_order(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return effects, that first which explains most by itself."""

@@ -38,12 +38,16 @@ def after_diagnosis(found: Diagnosis, model: str, data: Sequence[str], origin: O
     Returns
     -------
     str
-        Adds what is missing; where effects are tied or unknown, diagnoses again with the recording
-        that the verdict asks for; else compares with another one.
+        Adds what is missing, or else what the wire itself may do; where effects are tied or
+        unknown, diagnoses again with the recording that the verdict asks for; else compares with
+        another one.
     """
-    if found.verdict == 'missing' and not any(found.alternatives):
+    missing = [] if any(found.alternatives) else found.missing
+    if found.verdict == 'adequate' and found.kept_strain:
+        missing = [found.kept_strain['effect']]
+    if missing:
         return shlex.join([
-            'hysteresis', 'extend', '--model', model, '--add', ','.join(found.missing), '--data',
+            'hysteresis', 'extend', '--model', model, '--add', ','.join(missing), '--data',
             *data, *origin.reading, '--test', NEW, '-o', 'extended.yaml', '--report',
             'extended.html'])
     if found.verdict == 'adequate':
