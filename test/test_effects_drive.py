@@ -55,16 +55,6 @@ def test_inverse_undoes_the_forward_map(drive, phase, name):
         assert made.inverse(forward, inputs, WIRE) == pytest.approx(drive, abs=1e-11)
 
 
-@given(drives, st.floats(0.05, 1.5))
-def test_what_a_switch_takes_is_lacking_at_the_full_duty_too(drive, lost):
-    made = effect('pwm_dead_zone', Vd=lost, scaled=0.0)
-    forward = float(made.forward(drive, ROOM, WIRE))
-    assert forward == pytest.approx(max(drive - lost, 0.0), abs=1e-12)
-    if forward > 0.0:
-        assert made.inverse(forward, ROOM, WIRE) == pytest.approx(drive, abs=1e-11)
-    assert float(effect('pwm_dead_zone', Vd=lost).forward(6.0, ROOM, WIRE)) == pytest.approx(6.0)
-
-
 def test_less_than_nothing_stays_out_of_reach_behind_a_dead_zone():
     """A warmer room than that of the bench may ask for it; zero would be a lie."""
     made = effect('pwm_dead_zone', Vd=1.0)

@@ -54,24 +54,21 @@ class SupplySag(ElectricalEffect):
 
 
 class PwmDeadZone(ElectricalEffect):
-    """Pulses too short to switch the transistor on, or a voltage that the switch itself takes."""
+    """Pulses too short to switch the transistor on."""
 
     id = 'pwm_dead_zone'
-    sentence = ('Below a smallest duty the board delivers nothing; above it the voltage is scaled, '
-                'or lacks as much throughout.')
-    equation = 'Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - scaled Vd)'
-    source = 'switching and dead time of a PWM stage; forward voltage of a diode or transistor'
+    sentence = 'Below a smallest duty the board delivers nothing; above it the voltage is scaled.'
+    equation = 'Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd)'
+    source = 'switching and dead time of a PWM stage'
     shows_in = 'low V'
     experiment = 'fine steps of the voltage near 0'
     confused_with = ('ambient_drift',)
     parameters = (
         Parameter('Vd', 'V', 'largest voltage that has no effect', 0.05, 1.5, 0.0, (0.3, 1.0),
-                  log=True),
-        Parameter('scaled', '1', '1: the full duty gives the full voltage; 0: it lacks Vd, too',
-                  0.0, 1.0, 1.0, (1.0, 0.0), choices=(1.0, 0.0)))
+                  log=True),)
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
-        """Cut the lower end off and, if `scaled`, stretch the rest."""
+        """Cut the lower end off and stretch the rest."""
         return np.maximum(signal - self.Vd, 0.0) * self._stretch(surroundings)
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
@@ -80,7 +77,7 @@ class PwmDeadZone(ElectricalEffect):
 
     def _stretch(self, surroundings: Surroundings) -> float:
         full = math.sqrt(surroundings.full_drive_squared)
-        return full / max(full - self.scaled * self.Vd, 1e-3 * full)
+        return full / max(full - self.Vd, 1e-3 * full)
 
 
 class ResistanceChange(ElectricalEffect):
