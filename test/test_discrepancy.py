@@ -110,6 +110,16 @@ def test_what_is_left_besides_kept_strain_lacks_a_share_from_none_to_all():
     assert nothing.besides_kept(other) is other
 
 
+def test_a_muscle_without_martensite_keeps_nothing(monkeypatch):
+    model = bicep_model()
+    growth = effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)
+    problem = problem_for(model.with_effects([growth]), [runs(model)])
+    monkeypatch.setattr(discrepancy.FormationMemory, 'available', lambda surroundings: False)
+    found = discrepancy.discrepancy_along(
+        problem, [growth], problem.simulate([growth]), Settings())
+    assert not np.any(found.kept)
+
+
 @pytest.mark.parametrize('fitted', [True, False])
 def test_what_may_be_kept_is_no_discrepancy_where_it_is_an_effect(fitted):
     """In a set, or tried together with it, its own parameter says how much is kept."""

@@ -353,8 +353,9 @@ def test_kept_strain_of_the_laboratory_is_named_and_none_where_there_is_none(
     assert found.rmse_after < 0.7 * found.rmse_before
 
 
-def test_it_makes_no_sense_without_a_load():
+def test_it_makes_no_sense_without_a_load_or_without_heat():
     kind = catalogue()['formation_memory']
     there = bicep_model().surroundings
     assert kind.available(there)
     assert not kind.available(there._replace(load=0.0))
+    assert not kind.available(there._replace(drive='pressure'))

@@ -210,7 +210,8 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
     bench = gain * length_errors(problem.model, history.load) / math.sqrt(1.0 + DIRECTIONAL ** 2)
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
-    known = FormationMemory.id in {*tried, *(effect.id for effect in effects)}
+    known = (FormationMemory.id in {*tried, *(effect.id for effect in effects)}
+             or not FormationMemory.available(problem.model.surroundings))
     return Discrepancy(
         np.column_stack([bench, DIRECTIONAL * direction * bench, history.path]),
         np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])

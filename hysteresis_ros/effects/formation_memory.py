@@ -3,6 +3,7 @@
 """Martensite that keeps the strain of the load under which it formed until it is heated again."""
 
 from hysteresis_ros.effects.base import Parameter, Surroundings
+from hysteresis_ros.effects.material import HEATING
 from hysteresis_ros.effects.stages import MaterialEffect
 
 
@@ -45,8 +46,8 @@ class FormationMemory(MaterialEffect):
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:
-        """Whether a load was there at all."""
-        return surroundings.load > 0.0
+        """Whether a load was there at all, on a muscle that heat transforms."""
+        return surroundings.load > 0.0 and surroundings.drive in HEATING
 
     @classmethod
     def doubtful(cls, surroundings: Surroundings) -> bool:
