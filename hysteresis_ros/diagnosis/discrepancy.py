@@ -87,12 +87,14 @@ class Discrepancy:
         return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1)
                                      + np.sum(self.common ** 2, axis=1))))
 
+    def kept_share(self, residual: np.ndarray) -> float:
+        """Return the share of `kept`, from 0 to 1, that explains most of a residual (n,)."""
+        square = float(self.kept @ self.kept)
+        return float(np.clip(self.kept @ residual / square, 0.0, 1.0)) if square else 0.0
+
     def besides_kept(self, residual: np.ndarray) -> np.ndarray:
         """Return a residual (n,) without the share of `kept` that explains most of it."""
-        square = float(self.kept @ self.kept)
-        if square == 0.0:
-            return residual
-        return residual - np.clip(self.kept @ residual / square, 0.0, 1.0) * self.kept
+        return residual - self.kept_share(residual) * self.kept
 
     def matrix(self, kept: bool = True) -> np.ndarray:
         """Return the covariance, shape (n, n); without what martensite keeps if not `kept`."""

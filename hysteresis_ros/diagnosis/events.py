@@ -51,7 +51,8 @@ def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | No
     prior = max(float(np.mean(residual ** 2)), 1e-300)
     best, moment = -np.inf, rows[0]
     # As any effect, it has to explain more than the base model's own error.
-    large = [_explained(residual, steps * shape[:, None]) > selection.covariance.size ** 2
+    own = selection.covariance.discrepancy.besides_kept(residual)
+    large = [_explained(own, steps * shape[:, None]) > selection.covariance.size ** 2
              for shape in shapes]
     for point in selection.covariance.points:
         whitened = point.whiten(residual)

@@ -14,7 +14,6 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis import significance
-from hysteresis_ros.diagnosis.discrepancy import formation_change
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.effects.formation_memory import FormationMemory
 
@@ -42,16 +41,12 @@ def kept_strain(selection: Selection, fit: Fit) -> dict[str, Any] | None:
         to lower the RMSE by what matters.
     """
     problem, surroundings = selection.problem, selection.problem.model.surroundings
-    effects = [*unaffected(selection.fixed, fit.effects), *fit.effects]
-    known = {*selection.names, *(effect.id for effect in effects)}
-    if FormationMemory.id in known or not FormationMemory.available(surroundings):
-        return None
     before = problem.measured - fit.predicted
-    change = formation_change(problem, effects)
-    kept = float(np.clip(change @ before / max(float(change @ change), 1e-300), 0.0, 1.0))
-    size, = FormationMemory.parameters
+    discrepancy = (fit.covariance or selection.covariance).discrepancy
+    kept, (size,) = discrepancy.kept_share(before), FormationMemory.parameters
     if kept < size.low:
         return None
+    effects = [*unaffected(selection.fixed, fit.effects), *fit.effects]
     response, = problem.simulate_many([[*effects, FormationMemory(surroundings, kept=kept)]])
     after = problem.measured - response
     gain, _ = significance.gain_interval(before, after, problem.block, selection.rng)
