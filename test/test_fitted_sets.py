@@ -75,6 +75,13 @@ def test_what_martensite_keeps_is_no_part_of_the_models_own_error(fitter, sets, 
     assert other.own_error(NAMES) == other.error(NAMES) > 1e-5
 
 
+def test_what_martensite_keeps_does_not_raise_what_the_model_may_be_off_by(fitter, monkeypatch):
+    without = FittedSets(fitter, Settings(), np.random.default_rng(0)).rmse_95
+    monkeypatch.setattr(fitter.covariance, 'discrepancy', dataclasses.replace(
+        fitter.covariance.discrepancy, kept=np.ones(len(fitter.problem.measured))))
+    assert FittedSets(fitter, Settings(), np.random.default_rng(0)).rmse_95 == without
+
+
 def test_fits_are_judged_anew_with_each_covariance_that_is_added(fitter, sets):
     sets.keep(dataclasses.replace(fitted(fitter), log_evidence=-np.inf))
     sets.judge_all()

@@ -428,6 +428,17 @@ def test_an_event_has_to_explain_more_than_the_base_models_own_error():
         assert np.isfinite(events.most_probable(found.problem, found)[1]) == happened
 
 
+def test_what_martensite_keeps_is_no_event(monkeypatch):
+    """However much of a step a share of it would explain; of another course it hides nothing."""
+    step = 0.03 * (np.arange(90) >= 40)
+    model = bicep_model(metrics={'length': {'verification': {'rmse': 0.0001}}})
+    found = selection(model, recording(model, change=step), ())
+    for kept, happened in ((2.0 * step, False), (step[::-1] - step, True)):
+        monkeypatch.setattr(found.covariance, 'discrepancy', dataclasses.replace(
+            found.covariance.discrepancy, kept=kept))
+        assert np.isfinite(events.most_probable(found.problem, found)[1]) == happened
+
+
 def test_a_recording_without_an_event_has_none(model):
     """An effect that acts all the time is more probable than a step."""
     measured = recording(model, [effect_of(model, 'payload_error', dm=15.0)])
