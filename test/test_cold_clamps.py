@@ -55,6 +55,17 @@ def test_without_cold_ends_the_operator_is_the_models_own():
     np.testing.assert_array_equal(stage.weights, MODEL.length_stage.weights)
 
 
+def test_wires_that_differ_do_not_share_an_operator_or_its_memory():
+    def stage_of(model):
+        return model.require_length_stage(model.chain())
+    one, again = stage_of(clamped(0.1)), stage_of(clamped(0.1))
+    np.testing.assert_array_equal(one.weights, again.weights)
+    one.step(one.lower + 0.5 * (one.upper - one.lower))
+    assert again.save() == stage_of(clamped(0.1)).save() != one.save()
+    for other in (clamped(0.12), clamped(0.1, model=LINEAR), clamped(0.1, 'stress_dependence')):
+        assert not np.array_equal(stage_of(other).weights, one.weights), other.effects
+
+
 def arm_of_fifty_places(model, voltage, share):
     """Balance an arm whose wires are fifty places with an operator each; its angles [rad]."""
     chain, geometry = model.chain(), model.geometry

@@ -17,16 +17,21 @@ has hysteresis.
 
 from __future__ import annotations
 
+import copy
+import dataclasses
+import functools
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.operators import HysteresisOperator
 from hysteresis_ros.operators.preisach import Preisach
 from hysteresis_ros.operators.series import mean_in_series
 
 if TYPE_CHECKING:
+    from hysteresis_ros.bicep import BicepGeometry
     from hysteresis_ros.model.chain import Chain
     from hysteresis_ros.model.muscle import MuscleModel
 
@@ -37,6 +42,23 @@ FARTHEST = 20.0
 # The coldest places would transform at many times the full drive: relays are laid out up to twice
 # the range of H2, in so many intervals, and those beyond are put into the last.
 INTERVALS = 8
+# Wires that are remembered: where a search moves other parameters they come again.
+MOST_WIRES = 64
+
+
+@dataclasses.dataclass(frozen=True)
+class _Wire:
+    """What the second stage of a wire depends on whose places are not equally warm."""
+
+    second: Preisach
+    first: HysteresisOperator | None
+    full_drive_squared: float
+    load_per_drive_squared: float
+    load: float
+    parts: tuple[float, ...]
+    excess: tuple[float, ...]
+    # The same for the same values of all others.
+    chain: Chain = dataclasses.field(compare=False)
 
 
 def stage_of_places(model: MuscleModel, chain: Chain, stage: HysteresisOperator
@@ -66,26 +88,37 @@ def stage_of_places(model: MuscleModel, chain: Chain, stage: HysteresisOperator
         raise ParameterError('a wire with cold ends (effect cold_clamps) needs a Preisach length '
                              'stage of a muscle that contracts when driven, not a '
                              f'{stage.kind} one; identify it with --operator two-stage')
-    parts, excess = places
-    drives, levels = _first_stage(model, chain)
-    load = _usual_load(model, chain)
-    cold = load - levels[0]
+    assert isinstance(model.length_stage, Preisach)     # whose copy `stage` is
+    parts, excess = (tuple(column.tolist()) for column in places)
+    return copy.deepcopy(_mean(_Wire(
+        model.length_stage, model.force_stage, model.surroundings.full_drive_squared,
+        chain.load_per_drive_squared(), _usual_load(model, chain), parts, excess, chain)))
+
+
+@functools.lru_cache(maxsize=MOST_WIRES)
+def _mean(wire: _Wire) -> Preisach:
+    """Return H2 of the whole wire, whose memory is not looked at."""
+    stage = wire.second
+    drives, levels = _first_stage(wire)
+    cold = wire.load - levels[0]
     if not stage.lower < cold:
-        return stage
+        alike = copy.deepcopy(stage)
+        alike.reset()
+        return alike
     pad = stage.lower - (cold - stage.lower) * np.arange(INTERVALS, 0, -1) / INTERVALS
     nodes = np.concatenate((pad, stage.nodes))
-    felt = np.interp(load - nodes, levels, drives)
-    inputs = load - np.interp(excess[:, None] * felt, drives, levels)
+    felt = np.interp(wire.load - nodes, levels, drives)
+    inputs = wire.load - np.interp(np.array(wire.excess)[:, None] * felt, drives, levels)
     # Beyond the cold state no place is heated, and all are alike.
     inputs = np.where(nodes < cold, inputs, nodes)
     inputs[:, 0] = np.minimum(inputs[:, 0], stage.lower)
-    return mean_in_series(stage, nodes, inputs, parts)
+    return mean_in_series(stage, nodes, inputs, np.array(wire.parts))
 
 
-def _first_stage(model: MuscleModel, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+def _first_stage(wire: _Wire) -> tuple[np.ndarray, np.ndarray]:
     """Return drives squared and x for each, shape (n,)."""
-    first = model.first_stage(chain)
-    full = model.surroundings.full_drive_squared
+    first = FirstStage(wire.first, wire.chain)
+    full = wire.full_drive_squared
     drives = np.linspace(0.0, full, POINTS)
     first.reset()
     x = first.simulate(np.concatenate((drives, drives[::-1])))
@@ -102,8 +135,12 @@ def _usual_load(model: MuscleModel, chain: Chain) -> float:
         return 0.0
     load = model.mean_load
     if model.geometry is not None:
-        theta = np.linspace(*model.geometry.angle_range, POINTS)
-        middle = 0.5 * sum(model.require_length_range())
-        load = float(np.interp(
-            middle, model.geometry.length(theta), model.geometry.force(theta)))
+        load = _load_at(model.geometry, 0.5 * sum(model.require_length_range()))
     return float(chain.load_inside(np.float64(load)))
+
+
+@functools.lru_cache(maxsize=MOST_WIRES)
+def _load_at(geometry: BicepGeometry, length: float) -> float:
+    """Return the load [N] of the arm at rest where its muscle has a length [m]."""
+    theta = np.linspace(*geometry.angle_range, POINTS)
+    return float(np.interp(length, geometry.length(theta), geometry.force(theta)))
