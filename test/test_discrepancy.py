@@ -12,6 +12,7 @@ from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.model.chain import Chain
 
 
 @pytest.fixture(scope='module')
@@ -221,6 +222,49 @@ def test_the_discrepancy_follows_the_load(problem):
     assert np.ptp(error) > 1e-5
     assert found == pytest.approx(
         (error * gain) ** 2 + history.path ** 2)
+
+
+def with_relative(**parts):
+    """Return metrics of a bench whose errors differ between ends and halfway."""
+    return {'length': {'verification': {'rmse': 4e-4}, **{
+        part: {'rmse': 4e-4, 'relative_rmse': dict(zip(('ends', 'halfway'), pair))}
+        for part, pair in parts.items()}}}
+
+
+def test_the_error_halfway_is_as_much_larger_as_the_bench_says():
+    share = np.array([-0.1, 0.0, 0.25, 0.5, 1.0, 1.2])
+
+    def found(**parts):
+        return discrepancy.relative_errors(bicep_model(metrics=with_relative(**parts)), share)
+    between = np.sqrt(0.25 * 0.4 ** 2 + 0.75 * 2.0 ** 2)
+    assert found(verification=(0.4, 2.0)) == pytest.approx([0.4, 0.4, between, 2.0, 0.4, 0.4])
+    # Trials that verify and loads left out count alike.
+    both = found(verification=(0.4, 2.0), left_out=(1.0, 1.0))
+    assert both ** 2 == pytest.approx(0.5 * (found(verification=(0.4, 2.0)) ** 2 + 1.0))
+    assert found() == pytest.approx(np.ones(6))
+    assert found(identification=(0.4, 2.0)) == pytest.approx(np.ones(6))
+
+
+def test_the_discrepancy_is_larger_where_the_muscle_transforms(problem):
+    """An arm that is cold or hot is where the bench had most of its rows."""
+    model = dataclasses.replace(problem.model, metrics=with_relative(verification=(0.4, 2.0)))
+    problem = problem_for(model, [runs(model)])
+    gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
+    found = np.diag(discrepancy.discrepancy_along(
+        problem, [], problem.simulate([]), Settings()).matrix())
+    relative = discrepancy.relative_errors(model, history.martensite)
+    assert relative.max() - relative.min() > 0.5
+    assert found == pytest.approx((4e-4 * gain * relative) ** 2 + history.path ** 2)
+
+
+def test_martensite_along_the_way_is_that_of_the_second_stage(problem):
+    history = load_history(problem, [])
+    simulator, = problem.simulators
+    outputs = np.concatenate([response.output for response in simulator._responder(
+        Chain([], problem.model.surroundings))(simulator.trials)])
+    assert history.martensite == pytest.approx(
+        problem.model.martensite(outputs)[problem.chosen[0]], abs=5e-3)
+    assert history.martensite.max() - history.martensite.min() > 0.5
 
 
 def path_of(model, measured):

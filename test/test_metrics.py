@@ -5,7 +5,8 @@
 from hypothesis import given, strategies
 from hypothesis.extra.numpy import arrays
 from hysteresis_ros.measurements.metrics import (
-    errors, largest_noise, noise_floor, repeat_noise, resolution_noise, rmse_by_load, sample_noise)
+    errors, largest_noise, noise_floor, relative_rmse, repeat_noise, resolution_noise,
+    rmse_by_load, sample_noise)
 from hysteresis_ros.measurements import Measurement
 import numpy as np
 import pytest
@@ -121,3 +122,30 @@ def test_trials_under_the_same_load_are_one():
                          np.array([7.0, 7.02, 1.0, 1.0, 7.1, 7.06]), trial)
     assert found['loads'] == pytest.approx([1.0, 7.045])
     assert found['rmse_by_load'] == pytest.approx([4.0, np.sqrt(5.0)])
+
+
+def test_the_error_at_the_ends_and_halfway_is_over_that_of_its_trial():
+    """So that a trial with large errors does not decide alone what their course is."""
+    residual, response = np.array([1.0, 5.0, 1.0]), np.array([2.0, 3.0, 4.0])
+    square = residual ** 2 / 9.0
+    one = relative_rmse(residual, response, np.zeros(3))['relative_rmse']
+    assert one == pytest.approx({'ends': np.sqrt((square[0] + square[2]) / 2.0),
+                                 'halfway': np.sqrt(square[1])})
+    # A quarter of the way up a row counts by 3/4 as halfway.
+    four = relative_rmse(np.array([1.0, 2.0, 2.0, 1.0]), np.array([0.0, 1.0, 3.0, 4.0]),
+                         np.zeros(4))['relative_rmse']
+    assert four == pytest.approx({'ends': np.sqrt((2.0 + 0.5 * 4.0) / 2.5 / 2.5),
+                                  'halfway': np.sqrt(4.0 / 2.5)})
+    twice = relative_rmse(np.append(residual, -7.0 * residual), np.append(response, 3.0 * response),
+                          np.repeat([0, 1], 3))['relative_rmse']
+    assert twice == pytest.approx(one)
+
+
+def test_errors_alike_everywhere_are_one_and_trials_without_say_nothing():
+    response, trial = np.tile(np.linspace(1.0, 2.0, 9), 2), np.repeat([0, 1], 9)
+    alike = relative_rmse(np.full(18, 1e-4), response, trial)['relative_rmse']
+    assert alike == pytest.approx({'ends': 1.0, 'halfway': 1.0})
+    still = np.append(response[:9], np.ones(9))
+    assert relative_rmse(np.full(18, 1e-4), still, trial)['relative_rmse'] == pytest.approx(alike)
+    assert relative_rmse(np.zeros(18), response, trial) == {}
+    assert relative_rmse(np.ones(9), np.ones(9), np.zeros(9)) == {}

@@ -462,7 +462,7 @@ class BenchProblem(Problem):
         stage = _stage(design.nodes, fit.weights, fit.bias)
         metrics = dict(self.model.metrics)
         metrics['length'] = {**metrics.get('length', {}), **left_out(
-            fit, self.trial, self.signals.get('load'))}
+            fit, self.measured, self.trial, self.signals.get('load'))}
         return dataclasses.replace(
             self.model, effects=list(effects), length_stage=stage, metrics=metrics, replicates=[])
 

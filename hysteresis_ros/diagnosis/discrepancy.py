@@ -6,8 +6,9 @@ Discrepancy of the base model: how wrong it is by itself, as a covariance of an 
 It is known before the arm moves.
 
 * The bench says how large the error of the length is under each load, on trials or loads that were
-  held out. On the arm it shows as an error of the angle that is alike at neighbouring responses and
-  at drives between which the response does little, and differs between the directions of the drive.
+  held out, and by how much larger it is halfway through the transformation than at its ends. On
+  the arm it shows as an error of the angle that is alike at neighbouring responses and at drives
+  between which the response does little, and differs between the directions of the drive.
 * What the loads of the bench say, they say of all rows of an arm at once. A load that the bench
   lacks would change the model about as much as one that it has does when it is left out
   (`model.replicates`; Efron, The Jackknife, the Bootstrap and Other Resampling Plans, 1982).
@@ -30,6 +31,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.effects import Effect, Inputs, MaterialEffect, Parameter, Surroundings
 from hysteresis_ros.effects.formation_memory import FormationMemory
+from hysteresis_ros.measurements.metrics import halfway
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -173,6 +175,35 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     return np.sqrt(near @ squares / np.sum(near, axis=1))
 
 
+def relative_errors(model: MuscleModel, martensite: np.ndarray) -> np.ndarray:
+    """
+    Return the error of the length at a share of martensite over that of all, as the bench says.
+
+    A threshold that is a little off shows where the muscle transforms, and hardly where it is cold
+    or hot; and most rows of a bench are. The mean square is laid out between the ends and halfway
+    by 4 xi (1 - xi).
+
+    Parameters
+    ----------
+    model : MuscleModel
+    martensite : ndarray, shape (n,)
+        Share xi of martensite, 0 to 1.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        All 1 where the model's metrics say nothing of it.
+    """
+    metrics = model.metrics.get('length', {})
+    known = [metrics[part]['relative_rmse'] for part in ('verification', 'left_out')
+             if 'relative_rmse' in metrics.get(part, {})]
+    if not known:
+        return np.ones(len(martensite))
+    ends, between = (np.mean([one[name] ** 2 for one in known]) for name in ('ends', 'halfway'))
+    share = halfway(np.clip(martensite, 0.0, 1.0))
+    return np.sqrt((1.0 - share) * ends + share * between)
+
+
 def sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """Return how the angle follows an error of the length [rad/m], shape (n,)."""
     step = 0.01 * problem.model.surroundings.span
@@ -210,7 +241,9 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     direction = np.ones(len(predicted))
     if 'direction' in problem.signals:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
-    bench = gain * length_errors(problem.model, history.load) / math.sqrt(1.0 + DIRECTIONAL ** 2)
+    bench = (gain * length_errors(problem.model, history.load)
+             * relative_errors(problem.model, history.martensite)
+             / math.sqrt(1.0 + DIRECTIONAL ** 2))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
     known = (FormationMemory.id in {*tried, *(effect.id for effect in effects)}
              or not FormationMemory.available(problem.model.surroundings))

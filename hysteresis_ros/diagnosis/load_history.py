@@ -38,11 +38,14 @@ class LoadHistory:
     ----------
     load : ndarray, shape (n,)
         Tension of each muscle at rest [N].
+    martensite : ndarray, shape (n,)
+        Share of martensite, 0 to 1.
     path : ndarray, shape (n,)
         What the angle would differ if the present load had acted all along [rad].
     """
 
     load: np.ndarray
+    martensite: np.ndarray
     path: np.ndarray
 
 
@@ -74,12 +77,12 @@ def load_history(problem: ArmProblem, effects: Sequence[Effect]) -> LoadHistory:
 
 
 def _ways(problem: ArmProblem, effects: Sequence[Effect]
-          ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Give the load and the difference in the rows that are judged, trial by trial."""
+          ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Give load, martensite and difference in the rows that are judged, trial by trial."""
     model = problem.model
     chain = Chain(effects, model.surroundings)
     first, stage = model.first_stage(chain), model.require_length_stage(chain)
-    arm = _Statics(model, chain)
+    arm, span = _Statics(model, chain), max(float(np.ptp(stage.output_range)), 1e-12)
     for simulator, rows in zip(problem.simulators, problem.chosen):
         angle = simulator.run(effects)
         loads = arm.loads_between(np.min(angle), np.max(angle))
@@ -102,7 +105,7 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
                     for load in loads])
                 path = (arm.angle(loads, still[:, 1:][:, judged])
                         - arm.angle(loads, moving[None, 1:][:, judged]))
-            yield tension[1:][judged], path
+            yield tension[1:][judged], moving[1:][judged] / span, path
 
 
 class _Statics:

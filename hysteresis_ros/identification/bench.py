@@ -18,7 +18,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros import __version__
-from hysteresis_ros.measurements.metrics import errors, rmse_by_load
+from hysteresis_ros.measurements.metrics import errors, relative_rmse, rmse_by_load
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.errors import IdentificationError, ParameterError
 from hysteresis_ros.identification.baselines import fit_linear
@@ -246,7 +246,8 @@ def identify(length: Measurement | None = None, force: Measurement | None = None
     if length is not None and length_fit is not None:
         fitted = length.where(_fitted_rows(length, length_trials, length_rows))
         load = fitted.column(fitted.load) if fitted.load else None
-        model.metrics['length'].update(left_out(length_fit, fitted.column('trial'), load))
+        model.metrics['length'].update(left_out(
+            length_fit, fitted.column(fitted.response), fitted.column('trial'), load))
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit, force, length)
 
@@ -399,16 +400,19 @@ def measure(model: MuscleModel, force: Measurement | None, force_trials: Sequenc
                     for label, method in (('model', 'preisach'), ('linear', 'linear'))}
                 entry[part]['rmse'] = entry[part]['model']['rmse']
                 entry[part]['rows'] = int(np.count_nonzero(chosen))
-                if name == 'length' and measurement.load:
-                    entry[part].update(rmse_by_load(*(column[chosen] for column in (
-                        predicted['preisach'] - measured, measurement.column(measurement.load),
-                        measurement.column('trial')))))
+                if name == 'length':
+                    residual = (predicted['preisach'] - measured)[chosen]
+                    trial = measurement.column('trial')[chosen]
+                    entry[part].update(relative_rmse(residual, measured[chosen], trial))
+                    if measurement.load:
+                        load = measurement.column(measurement.load)[chosen]
+                        entry[part].update(rmse_by_load(residual, load, trial))
         metrics[name] = entry
     return metrics
 
 
-def left_out(fit: WeightFit, groups: np.ndarray, load: np.ndarray | None = None
-             ) -> dict[str, Any]:
+def left_out(fit: WeightFit, response: np.ndarray, groups: np.ndarray,
+             load: np.ndarray | None = None) -> dict[str, Any]:
     """
     Return the metric of trials, mostly of other loads, that were left out of the fit.
 
@@ -416,6 +420,8 @@ def left_out(fit: WeightFit, groups: np.ndarray, load: np.ndarray | None = None
     ----------
     fit : WeightFit
         Of H2.
+    response : ndarray, shape (n,)
+        Of the rows fitted, as measured.
     groups : ndarray, shape (n,)
         Trial of each row fitted.
     load : ndarray, shape (n,), optional
@@ -429,7 +435,8 @@ def left_out(fit: WeightFit, groups: np.ndarray, load: np.ndarray | None = None
     if len(np.unique(groups)) < 2 or not np.isfinite(fit.held_out_rmse):
         return {}
     by_load = {} if load is None else rmse_by_load(fit.held_out, load, groups)
-    return {'left_out': {'rmse': fit.held_out_rmse, **by_load}}
+    return {'left_out': {'rmse': fit.held_out_rmse, **by_load,
+                         **relative_rmse(fit.held_out, response, groups)}}
 
 
 def _provenance(force: Measurement | None, force_trials: Sequence[float] | None,

@@ -97,6 +97,44 @@ def rmse_by_load(residual: np.ndarray, load: np.ndarray, trial: np.ndarray
             'rmse_by_load': [float(np.sqrt(np.mean(residual[rows] ** 2))) for rows in chosen]}
 
 
+def relative_rmse(residual: np.ndarray, response: np.ndarray, trial: np.ndarray
+                  ) -> dict[str, dict[str, float]]:
+    """
+    Return the error at the ends of the transformation and halfway, over that of all rows.
+
+    Each row counts as halfway by 4 p (1 - p), with p the place of its response between the ends of
+    its trial, and the more so as an end.
+
+    Parameters
+    ----------
+    residual, response, trial : ndarray, shape (rows,)
+
+    Returns
+    -------
+    dict
+        'relative_rmse' with 'ends' and 'halfway'; nothing where no trial has response and error.
+
+    """
+    squares, shares = [], []
+    for one in np.unique(trial):
+        rows = trial == one
+        mean, span = float(np.mean(residual[rows] ** 2)), float(np.ptp(response[rows]))
+        if mean > 0.0 and span > 0.0:
+            squares.append(residual[rows] ** 2 / mean)
+            shares.append(halfway((response[rows] - np.min(response[rows])) / span))
+    if not squares:
+        return {}
+    square, share = np.concatenate(squares), np.concatenate(shares)
+    found = {name: float(np.sqrt(square @ weight / max(float(np.sum(weight)), 1e-12)))
+             for name, weight in (('ends', 1.0 - share), ('halfway', share))}
+    return {'relative_rmse': found}
+
+
+def halfway(place: np.ndarray) -> np.ndarray:
+    """Return 4 p (1 - p), from 0 at the ends of a transformation to 1 halfway, for places p."""
+    return 4.0 * place * (1.0 - place)
+
+
 def finite(value: float) -> float | None:
     """Return a float that JSON can hold, or None."""
     return float(value) if np.isfinite(value) else None

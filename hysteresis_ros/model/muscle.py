@@ -70,8 +70,9 @@ class MuscleModel:
     replicates : list of Replicate
         H2 and effects as identified without one of the bench's loads each.
     metrics, provenance : dict
-        Errors of the identification (of lengths also `rmse_by_load` [m] at `loads` [N]), and where
-        the model came from.
+        Errors of the identification (of lengths also `rmse_by_load` [m] at `loads` [N], and
+        `relative_rmse` at the ends of the transformation and halfway), and where the model came
+        from.
     """
 
     kind: str
