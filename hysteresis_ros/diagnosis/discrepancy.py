@@ -17,6 +17,9 @@ It is known before the arm moves.
   that. One of them feels the present load alone (`load_history`). In another one martensite keeps
   the strain of the load under which it formed: a share that is the same for the whole wire, so that
   all rows err together; but where that effect is tried, it speaks for itself.
+* Every room warms up and cools down. Where that was recorded, its course is known and only its size
+  is not. As long as it is less than the errors above, it is one of them, and no answer; what moves
+  the arm by more is what `ambient_temperature` is for.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.effects import Effect, Inputs, MaterialEffect, Parameter, Surroundings
+from hysteresis_ros.effects.ambient import AmbientTemperature
 from hysteresis_ros.effects.formation_memory import FormationMemory
 from hysteresis_ros.measurements.metrics import halfway
 
@@ -42,6 +46,8 @@ if TYPE_CHECKING:
 DIRECTIONAL = 0.5
 # Share of its strain that martensite keeps, root mean square: from none to all, each as likely.
 KEPT = 1.0 / math.sqrt(3.0)
+# By how much the full drive heats a muscle above the room [K], about.
+FULL_HEAT = 80.0
 # Decimals, in parts of its range, to which two drives differ.
 DRIVE_DECIMALS = 9
 # Of as many loads one lies between others, and tells what the model does between them.
@@ -213,7 +219,8 @@ def sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
 
 
 def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted: np.ndarray,
-                      settings: Settings, tried: Collection[str] = ()) -> Discrepancy:
+                      settings: Settings, tried: Collection[str] = (), room: bool = False
+                      ) -> Discrepancy:
     """
     Return the base model's own error of the angle, along the way that the arm takes.
 
@@ -232,6 +239,8 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     settings : Settings
     tried : collection of str
         Identifiers of all effects that may explain the recording.
+    room : bool
+        Whether what the recorded room does is one of the errors; see `room_is_calm`.
 
     Returns
     -------
@@ -245,12 +254,15 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
              * relative_errors(problem.model, history.martensite)
              / math.sqrt(1.0 + DIRECTIONAL ** 2))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
+    parts = np.column_stack([bench, DIRECTIONAL * direction * bench, history.path])
+    common = left_out_changes(problem, effects)
+    if room:
+        common = np.column_stack([common, room_change(problem, effects)])
     known = (FormationMemory.id in {*tried, *(effect.id for effect in effects)}
              or not FormationMemory.available(problem.model.surroundings))
     return Discrepancy(
-        np.column_stack([bench, DIRECTIONAL * direction * bench, history.path]),
-        np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])
-        / settings.correlation, left_out_changes(problem, effects),
+        parts, np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])
+        / settings.correlation, common,
         np.zeros(len(predicted)) if known else formation_change(problem, effects))
 
 
@@ -291,6 +303,37 @@ def left_out_changes(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarr
     responses = problem.simulate_replicates(effects)
     own, = problem.simulate_many([effects])
     return ((responses - own) / math.sqrt(max(len(responses), 1))).T
+
+
+def room_is_calm(problem: ArmProblem, discrepancy: Discrepancy) -> bool:
+    """Return whether what the recorded room does is less than the model's own error without it."""
+    change = room_change(problem, problem.model.effects)
+    return 0.0 < float(np.sqrt(np.mean(change ** 2))) < discrepancy.size_besides_kept
+
+
+def room_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+    """
+    Return what the recorded room typically does to the response, about its mean, shape (n,).
+
+    Not that of a room that is as warm all the time but another one than the bench's.
+
+    Parameters
+    ----------
+    problem : ArmProblem
+        Rows and model.
+    effects : sequence of Effect
+        All effects of the model.
+    """
+    ambient = problem.signals.get('ambient')
+    surroundings = problem.model.surroundings
+    if ambient is None or any(effect.id == AmbientTemperature.id for effect in effects):
+        return np.zeros(len(problem.measured))
+    typical = AmbientTemperature(
+        surroundings, gain=surroundings.full_drive_squared / FULL_HEAT,
+        reference=float(np.mean(ambient)))
+    own, moved = problem.simulate_many([effects, [*effects, typical]])
+    change: np.ndarray = moved - own
+    return change
 
 
 def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.ndarray:

@@ -50,13 +50,19 @@ def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
         column = effect.needs_column
         if effect.needs_transients and problem.settled:
             unobservable[name] = 'every row is settled'
-        elif column and not any(
-                np.ptp(m.columns[column]) > effect.smallest_change if column in m.columns else False
-                for m in problem.measurements):
+        elif column and not recorded_range(problem, column) > effect.smallest_change:
             unrecorded[name] = f'{column} was not recorded or did not change'
         else:
             names.append(name)
     return names, {**unobservable, **unrecorded}
+
+
+def recorded_range(problem: Problem, column: str) -> float:
+    """Return the range of a recorded column over all recordings; 0 where it was not recorded."""
+    values = np.concatenate([np.zeros(0), *(
+        m.columns[column] for m in problem.measurements if column in m.columns)])
+    values = values[np.isfinite(values)]
+    return float(np.ptp(values)) if len(values) else 0.0
 
 
 def present(model: MuscleModel, kind: type[Effect]) -> Effect:

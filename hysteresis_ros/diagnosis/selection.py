@@ -20,7 +20,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance, Point
-from hysteresis_ros.diagnosis.discrepancy import discrepancy_along
+from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, room_is_calm
 from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
 from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_starts
 from hysteresis_ros.diagnosis.observable import observable, unaffected
@@ -68,10 +68,12 @@ class Selection:
         self.names, self.unobservable = observable(problem)
         self.fixed = list(problem.model.effects)
         predicted = problem.simulate(self.fixed)
+        without = discrepancy_along(problem, self.fixed, predicted, settings, self.names)
+        # Once for all sets, or it would decide between two of them.
+        self._calm = room_is_calm(problem, without)
         self.covariance = Covariance(
-            discrepancy_along(problem, self.fixed, predicted, settings, self.names),
-            problem.clock, problem.trial, problem.noise, problem.largest_noise,
-            settings.scale_spread)
+            self._along(self.fixed, predicted) if self._calm else without, problem.clock,
+            problem.trial, problem.noise, problem.largest_noise, settings.scale_spread)
         self.fitter = Fitter(problem, self.covariance, self._discrepancy)
         for drift, noise in FIRST_POINTS:
             self.covariance.add(self.covariance.start(drift, noise))
@@ -94,12 +96,16 @@ class Selection:
         share is two standard deviations.
         """
         effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
-        found = discrepancy_along(
-            self.problem, effects, fit.predicted, self.settings, self.names)
+        found = self._along(effects, fit.predicted)
         without = self.fitter.simulate([
             [one for one in fit.effects if one is not effect] for effect in fit.effects])
         return dataclasses.replace(found, parts=np.column_stack([
             found.parts, *(0.5 * self.settings.form * (fit.predicted - without))]))
+
+    def _along(self, effects: Sequence[Effect], predicted: np.ndarray) -> Discrepancy:
+        """Return the base model's own error where the arm goes with all effects of a model."""
+        return discrepancy_along(
+            self.problem, effects, predicted, self.settings, self.names, self._calm)
 
     def run(self) -> None:
         """Score all single effects and pairs, fit the best, and grow sets from them."""

@@ -1,0 +1,107 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A room whose temperature was recorded: what it explains, and what it must not take up."""
+
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis import selection
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, room_change, room_is_calm
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.observable import observable
+from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.measurements import Measurement
+from model_support import bicep_model, effect_of, runs, with_noise
+
+MODEL = bicep_model()
+# A warm and a cold hour, as a thermostat makes them.
+WANDER = np.sin(np.arange(120) / 9.0)
+SEVERAL = ['ambient_temperature', 'payload_error', 'airflow', 'supply_sag', 'encoder_offset',
+           'pwm_dead_zone', 'fatigue']
+
+
+def in_room(ambient, reference, *others, gain=0.4, seed=0):
+    """Return an arm run in a recorded room [degC], of a muscle whose bench had another one."""
+    run = runs(MODEL, trials=4, rows=30, seed=seed)
+    run = Measurement.from_columns({**run.columns, 'ambient_temperature': ambient + np.zeros(120)})
+    room = effect_of(MODEL, 'ambient_temperature', gain=gain, reference=reference)
+    return Measurement.from_columns({
+        **run.columns, 'angle': MODEL.with_effects([room, *others]).predict(run)})
+
+
+def discrepancy_of(problem, room):
+    return discrepancy_along(problem, [], problem.simulate([]), Settings(), (), room)
+
+
+@pytest.mark.parametrize('days', [(22.0,), (22.0, 22.3), (22.0, 26.0)])
+def test_a_cold_and_a_warm_day_are_a_change(days):
+    """Within neither the room has to change: that is what the effect's experiment asks for."""
+    problem = problem_for(MODEL, [in_room(day, 22.0, seed=number)
+                                  for number, day in enumerate(days)])
+    names, unobservable = observable(problem)
+    assert ('ambient_temperature' in names) == (np.ptp(days) > 0.5)
+    assert 'ambient_temperature' in {*names, *unobservable}
+
+
+def test_a_day_without_a_thermometer_does_not_hide_the_other_two():
+    """Nor do values that are not there."""
+    plain = runs(MODEL, trials=4, rows=30, seed=5)
+    warm = in_room(26.0, 22.0)
+    warm.columns['ambient_temperature'][3] = np.nan
+    names, _ = observable(problem_for(MODEL, [in_room(22.0, 22.0), plain, warm]))
+    assert 'ambient_temperature' in names
+
+
+def test_a_cold_and_a_warm_day_name_the_room():
+    found = diagnose(MODEL, [in_room(day, 22.0, seed=number)
+                             for number, day in enumerate((21.0, 27.0))], SEVERAL)
+    assert (found.verdict, found.missing, found.alternatives) == (
+        'missing', ['ambient_temperature'], [[]])
+    effect, = found.effects
+    assert (effect.gain, effect.reference) == pytest.approx((0.4, 22.0), rel=0.1)
+
+
+def test_a_room_that_wanders_little_is_an_error_of_known_course():
+    problem = problem_for(MODEL, [in_room(22.0 + 0.2 * WANDER, 22.0)])
+    change = room_change(problem, [])
+    gain = MODEL.surroundings.full_drive_squared / 80.0
+    moved = problem.simulate([effect_of(
+        MODEL, 'ambient_temperature', gain=gain,
+        reference=float(np.mean(problem.signals['ambient'])))])
+    np.testing.assert_allclose(change, moved - problem.simulate([]), atol=1e-12)
+    without, with_it = (discrepancy_of(problem, room) for room in (False, True))
+    assert room_is_calm(problem, without)
+    np.testing.assert_array_equal(with_it.common[:, -1], change)
+    assert with_it.common.shape[1] == without.common.shape[1] + 1
+    # Where the effect acts itself, its own gain says what the room does.
+    assert not np.any(room_change(problem, [effect_of(MODEL, 'ambient_temperature')]))
+
+
+def test_a_room_that_moves_the_arm_by_more_is_for_the_effect_to_explain():
+    problem = problem_for(MODEL, [in_room(22.0 + 5.0 * WANDER, 22.0)])
+    assert not room_is_calm(problem, discrepancy_of(problem, False))
+    still = problem_for(MODEL, [in_room(22.0, 22.0)])
+    assert not np.any(room_change(still, []))
+    assert not room_is_calm(still, discrepancy_of(still, False))
+
+
+def test_a_wandering_room_does_not_speak_against_another_effect(monkeypatch):
+    """The effect follows the recorded course, and a bench in another room would do the rest."""
+    run = in_room(22.0 + 0.4 * WANDER, 22.0, effect_of(MODEL, 'pwm_dead_zone', Vd=0.4))
+    slow = np.convolve(np.random.default_rng(3).standard_normal(131), np.ones(12), 'valid')
+    run = with_noise(run, np.radians(0.3) * slow / np.std(slow))
+
+    def share_of_the_room():
+        found = diagnose(MODEL, [run], SEVERAL)
+        assert found.missing == ['pwm_dead_zone']
+        return sum(entry['probability'] for entry in found.sets
+                   if 'ambient_temperature' in entry['effects'])
+    share = share_of_the_room()
+    monkeypatch.setattr(selection, 'room_is_calm', lambda *_: False)
+    assert share < 0.02 and share_of_the_room() > 0.1
+
+
+def test_a_room_that_wanders_far_is_named():
+    found = diagnose(MODEL, [in_room(22.0 + 4.0 * WANDER, 22.0)], SEVERAL)
+    assert (found.verdict, found.missing) == ('missing', ['ambient_temperature'])
