@@ -195,7 +195,7 @@ def test_a_value_outside_its_range_is_warned_of(case, tmp_path):
                      'Adding payload_error takes 98 % off']),
     ('missing', {'missing': ['payload_error', 'backlash'], 'alternatives': [[], []]},
      ['Also missing: backlash', 'Adding them']),
-    ('unknown', {'unexplained': 0.6, 'event': 1234.4}, ['60 %', 'happened at 1234 s']),
+    ('unknown', {'unexplained': 0.6, 'event': 1234.4}, ['60 %', 'happened 1234 s after']),
     ('unknown', {'unexplained': 0.6, 'signal': 'cycles'}, ['shows in cycles', '60 %']),
     ('unknown', {'uneven': True}, ['like noise', 'larger at some times']),
     ('unknown', {'resembles': ['end_stop', 'slack']}, ['like end_stop with slack', 'not physical']),

@@ -74,6 +74,7 @@ def without_bench_effects(model: MuscleModel, measurements: Sequence[Measurement
 def to_text(found: Diagnosis, response: str) -> str:
     """Return the diagnosis for a terminal."""
     from hysteresis_ros.comparison.compare import layout
+    from hysteresis_ros.report.reasons import all_probabilities
     from hysteresis_ros.report.words import (
         draws_in_words, error_in_words, noise_in_words, parameters_in_words, typical_in_words,
         verdict_in_words)
@@ -94,6 +95,8 @@ def to_text(found: Diagnosis, response: str) -> str:
             ('error of the base model about', found.structural_error),
             ('no error matters below', found.small_error)) if value is not None),
         f'unexplained {100.0 * found.unexplained:.0f} %']))
+    if found.sets:
+        lines.append('probability: ' + all_probabilities(found))
     rows = [['effect', f'{found.error_name} after [{unit}]', 'gain', 'p', 'absorbed', 'parameters']]
     for row in found.ranking[:10]:
         values = parameters_in_words(row['parameters'], intervals=False)
@@ -102,6 +105,9 @@ def to_text(found: Diagnosis, response: str) -> str:
                      f'{100.0 * row["absorbed"]:.0f} %',
                      values + ('' if row['plausible'] else ' (outside its physical range)')])
     lines += ['', *layout(rows)]
+    if len(rows) > 1:
+        lines.append('absorbed: share of what an effect changes that other weights of the model '
+                     'could change, too')
     if draws_in_words(found):
         lines.append(draws_in_words(found))
     if found.not_excited:

@@ -120,8 +120,9 @@ def report(found: Identified) -> str:
     lines = layout(rows)
     for name, fit in (('H1', found.force_fit), ('H2', found.length_fit)):
         if fit is not None:
-            lines.append(f'{name}: {len(fit.weights)} weights, rank {fit.rank}, '
-                         f'{len(fit.never_excited)} cells never excited, bias {fit.bias:.4g}')
+            lines.append(f'{name}: {len(fit.weights)} weights, of which the rows determine '
+                         f'{fit.rank} combinations, {len(fit.never_excited)} cells never excited, '
+                         f'bias {fit.bias:.4g}')
     for effect in found.model.effects:
         lines.append(f'+ {effect.id}: {parameters_in_words(effect.to_dict()["parameters"])}')
     return '\n'.join(lines)

@@ -58,7 +58,7 @@ class PwmDeadZone(ElectricalEffect):
 
     id = 'pwm_dead_zone'
     sentence = 'Below a smallest duty the board delivers nothing; above it the voltage is scaled.'
-    equation = 'Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd)'
+    equation = 'Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd), Vmax the largest of the bench'
     source = 'switching and dead time of a PWM stage'
     shows_in = 'low V'
     experiment = 'fine steps of the voltage near 0'

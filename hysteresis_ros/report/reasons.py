@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Errors within this share of each other are as good as the same.
 ALIKE = 0.1
+# Probabilities that are told, and how many at most.
+LEAST_TOLD, MOST_TOLD = 0.01, 6
 
 
 def answers(found: Diagnosis) -> list[frozenset[str]]:
@@ -31,6 +33,13 @@ def probabilities(found: Diagnosis) -> list[tuple[str, float]]:
     """Return each possible answer that was weighed, in words, with its probability."""
     return [(named(names), entry['probability']) for names in answers(found)
             for entry in found.sets if frozenset(entry['effects']) == names]
+
+
+def all_probabilities(found: Diagnosis) -> str:
+    """Return what was weighed with its probability, in words; not what is less likely than 0.01."""
+    told = [entry for entry in found.sets if entry['probability'] >= LEAST_TOLD]
+    return ', '.join(f'{named(entry["effects"])} {share(entry["probability"])}'
+                     for entry in told[:MOST_TOLD])
 
 
 def share(value: float) -> str:

@@ -70,7 +70,8 @@ def _verdict(found: Diagnosis) -> str:
             text = ('Unknown: something acts here that no effect of the catalogue explains '
                     f'({100.0 * found.unexplained:.0f} % of the mean square error).')
         if found.event is not None:
-            text += f' It happened at {found.event:.0f} s and lasts.'
+            text += (f' It happened {found.event:.0f} s after the recording began, trial after '
+                     'trial, and lasts.')
         elif found.signal:
             text += f' It shows in {found.signal}.'
         elif found.uneven:
