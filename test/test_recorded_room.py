@@ -11,7 +11,11 @@ from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, room_change,
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.effects.ambient import AmbientTemperature
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.laboratory.experiments import experiment_tables
 from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.model import MuscleModel
 from model_support import bicep_model, effect_of, runs, with_noise
 
 MODEL = bicep_model()
@@ -105,3 +109,31 @@ def test_a_wandering_room_does_not_speak_against_another_effect(monkeypatch):
 def test_a_room_that_wanders_far_is_named():
     found = diagnose(MODEL, [in_room(22.0 + 4.0 * WANDER, 22.0)], SEVERAL)
     assert (found.verdict, found.missing) == ('missing', ['ambient_temperature'])
+
+
+def test_a_bench_whose_room_was_recorded_says_what_the_reference_is(tmp_path):
+    tables = experiment_tables('bench', {}, 3)
+    length = tables['length.csv']
+    room = 21.0 + 0.4 * np.sin(np.arange(len(length['voltage'])))
+    model = identify(Measurement.from_columns({**length, 'ambient_temperature': room}),
+                     Measurement.from_columns(tables['force.csv'])).model
+    model.save(tmp_path / 'model.yaml')
+    model = MuscleModel.load(tmp_path / 'model.yaml')
+    assert model.surroundings.ambient == pytest.approx((20.6, 21.4), abs=1e-3)
+    _, reference = AmbientTemperature.describe(model.surroundings)
+    assert (reference.low, reference.neutral, reference.high) == pytest.approx(
+        (19.6, 21.0, 22.4), abs=1e-3)
+    assert MODEL.surroundings.ambient is None
+    assert AmbientTemperature.describe(MODEL.surroundings) == AmbientTemperature.parameters
+
+
+def test_of_a_bench_in_the_same_room_nothing_else_is_taken_for_it():
+    """And of one in another room nothing else is named."""
+    model = bicep_model(ranges={**MODEL.ranges, 'ambient_temperature': (21.8, 22.2)})
+    heavy = in_room(22.0 + 0.4 * WANDER, 22.0, effect_of(MODEL, 'airflow', beta=1.1))
+    found = diagnose(model, [heavy], SEVERAL)
+    assert found.missing[0] in ('airflow', 'supply_sag')
+    assert not any('ambient_temperature' in entry['effects'] for entry in found.sets)
+    found = diagnose(model, [in_room(27.0 + 0.4 * WANDER, 22.0)], SEVERAL)
+    assert (found.missing, found.alternatives) == (['ambient_temperature'], [[]])
+    assert found.effects[0].gain == pytest.approx(0.4, rel=0.15)

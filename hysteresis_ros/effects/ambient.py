@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What warmer or colder air adds to the drive squared that the muscle feels (Eq. 2)."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -18,7 +19,7 @@ class AmbientTemperature(ThermalEffect):
     equation = 'Vs^2 = V^2 + (d1/d2) (Ta - T0)'
     source = 'Eq. 2 of the paper with a variable T0'
     shows_in = 'the recorded ambient temperature'
-    experiment = 'log the ambient temperature on a cold and on a warm day'
+    experiment = 'log the ambient temperature on a cold and on a warm day, and on the bench'
     confused_with = ('ambient_drift',)
     needs_column = 'ambient_temperature'
     smallest_change = 0.5
@@ -27,6 +28,21 @@ class AmbientTemperature(ThermalEffect):
                   0.0, (0.2, 0.6), log=True),
         Parameter('reference', 'degC', 'ambient temperature T0 of the bench', 5.0, 40.0, 25.0,
                   (23.0,)),)
+
+    # What two thermometers, or two places of a room, differ by [K].
+    APART = 1.0
+
+    @classmethod
+    def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
+        """Give the reference the range that was recorded on the bench, where it was."""
+        gain, reference = cls.parameters
+        if surroundings is None or surroundings.ambient is None:
+            return cls.parameters
+        low, high = surroundings.ambient
+        middle = 0.5 * (low + high)
+        return gain, dataclasses.replace(
+            reference, low=low - cls.APART, high=high + cls.APART, neutral=middle,
+            starts=(middle,))
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Add what warmer or colder air stands for; nothing where it was not recorded."""

@@ -128,6 +128,8 @@ class Surroundings(NamedTuple):
     one that gets longer. `rest_load` is the load under which the cold muscle has its resting
     length, and `least` the response of H2 where it has transformed altogether. `muscles` is the
     number of parallel muscles that lift the arm, 1 without an arm. `operator` is the kind of H2.
+    `ambient` is the range of the ambient temperature on the bench [degC], None where it was not
+    recorded.
     """
 
     length: float
@@ -144,6 +146,7 @@ class Surroundings(NamedTuple):
     least: float = 0.0
     muscles: int = 1
     operator: str = 'preisach'
+    ambient: tuple[float, float] | None = None
 
 
 class Effect(abc.ABC):

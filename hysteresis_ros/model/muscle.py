@@ -64,7 +64,8 @@ class MuscleModel:
     geometry : BicepGeometry, optional
         The arm it drives.
     ranges : dict of str to (float, float)
-        What was seen of drive, load and response.
+        What was seen of drive, load and response, and of the ambient temperature [degC] where that
+        was recorded.
     mean_load : float
         Mean load of the bench's length table.
     replicates : list of Replicate
@@ -128,7 +129,8 @@ class MuscleModel:
                             self.drive, self.load_name, self.response, self.cold_drive,
                             self.drive_range, self.sign, rest_load, least,
                             int(self.geometry.muscle_count) if self.geometry else 1,
-                            self.length_stage.kind if self.length_stage is not None else '')
+                            self.length_stage.kind if self.length_stage is not None else '',
+                            self.ranges.get('ambient_temperature'))
 
     def with_effects(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return a copy with other effects and the same operators."""
