@@ -346,7 +346,7 @@ def test_muscle_says_what_scales_effects_refer_to():
         'length': 0.27, 'load': 3.0, 'full_drive_squared': 36.0, 'span': pytest.approx(0.0205),
         'drive': 'voltage', 'load_name': 'force', 'response': 'length', 'cold': 0.0,
         'drive_range': 6.0, 'sign': -1, 'rest_load': 0.5, 'least': pytest.approx(-0.0205),
-        'muscles': 3, 'operator': 'preisach'}
+        'muscles': 3, 'operator': 'preisach', 'ambient': None}
     hot = bicep_model(drive='temperature', response='strain', geometry=None, sign=1,
                       ranges={'temperature': (20.0, 150.0), 'strain': (0.0, 0.04)}).surroundings
     assert (hot.length, hot.full_drive_squared, hot.cold, hot.drive_range, hot.sign) == (
