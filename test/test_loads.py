@@ -52,6 +52,9 @@ def test_the_error_of_loads_left_out_is_kept(two_loads, tmp_path):
     by_load = two_loads.metrics['length']['left_out']
     assert by_load['loads'] == pytest.approx([1.18, 7.06], abs=0.02)
     assert max(by_load['rmse_by_load']) > by_load['rmse'] > min(by_load['rmse_by_load'])
+    # A threshold that is off shows where the muscle transforms.
+    relative = by_load['relative_rmse']
+    assert relative['halfway'] > 1.1 > 1.0 > relative['ends'] > 0.3
     one = identify(length, force, length_trials=[0], force_trials=[0]).model
     assert 'left_out' not in one.metrics['length']
 

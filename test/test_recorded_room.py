@@ -106,6 +106,19 @@ def test_a_wandering_room_does_not_speak_against_another_effect(monkeypatch):
     assert share < 0.02 and share_of_the_room() > 0.1
 
 
+@pytest.mark.parametrize('drive, counts', [
+    ('voltage', True), ('power', True), ('pressure', False), ('temperature', False)])
+def test_a_room_counts_where_the_drive_heats(drive, counts):
+    """The air does nothing to a pressure, and a wire's own temperature has it in it."""
+    run = in_room(22.0 + 0.2 * WANDER, 22.0)
+    model = bicep_model(drive=drive, ranges={**MODEL.ranges, drive: MODEL.ranges['voltage']})
+    columns = {**run.columns, drive: run.columns['voltage']}
+    if drive != 'voltage':
+        del columns['voltage']
+    problem = problem_for(model, [Measurement.from_columns(columns)])
+    assert np.any(room_change(problem, [])) == counts
+
+
 def test_a_room_that_wanders_far_is_named():
     found = diagnose(MODEL, [in_room(22.0 + 4.0 * WANDER, 22.0)], SEVERAL)
     assert (found.verdict, found.missing) == ('missing', ['ambient_temperature'])

@@ -219,6 +219,21 @@ def test_a_p_value_says_when_it_is_the_smallest_that_the_draws_can_give():
     assert 'random draws' not in to_text(found, 'angle')
 
 
+def test_the_text_tells_probabilities_and_what_absorbed_means():
+    """Most probable first, as they come; none of less than one in a hundred."""
+    found = diagnosis(sets=[
+        {'effects': ['payload_error', 'backlash'], 'probability': 0.62, 'rmse': 0.01},
+        {'effects': [], 'probability': 0.361, 'rmse': 0.01},
+        {'effects': ['unknown'], 'probability': 0.012, 'rmse': 0.01},
+        {'effects': ['slack'], 'probability': 0.004, 'rmse': 0.01}],
+        ranking=[row('payload_error', 0.002)])
+    text = to_text(found, 'angle')
+    assert ('probability: backlash with payload_error 0.62, the model as it is 0.36, '
+            'an unknown cause 0.01\n') in text
+    assert 'absorbed: share of what an effect changes' in text
+    assert 'probability' not in to_text(diagnosis(sets=[], ranking=[]), 'angle')
+
+
 def test_an_effect_is_not_both_ranked_and_one_that_could_not_have_shown():
     found = shown_or_not(diagnosis(
         not_excited={'supply_sag': 'too weak', 'payload_error': 'too weak', 'encoder_offset': '-'},

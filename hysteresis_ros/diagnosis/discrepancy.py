@@ -34,6 +34,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.effects import Effect, Inputs, MaterialEffect, Parameter, Surroundings
 from hysteresis_ros.effects.ambient import AmbientTemperature
+from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.formation_memory import FormationMemory
 from hysteresis_ros.measurements.metrics import halfway
 
@@ -277,9 +278,14 @@ def formation_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarr
     effects : sequence of Effect
         All effects of the model, `formation_memory` not among them.
     """
-    kept = FormationMemory(problem.model.surroundings, kept=1.0)
-    own, keeping = problem.simulate_many([effects, [*effects, kept]])
-    change: np.ndarray = keeping - own
+    return _change_by(
+        FormationMemory(problem.model.surroundings, kept=1.0), problem, effects)
+
+
+def _change_by(effect: Effect, problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+    """Return what one more effect than some changes the response by, shape (n,)."""
+    own, changed = problem.simulate_many([effects, [*effects, effect]])
+    change: np.ndarray = changed - own
     return change
 
 
@@ -326,14 +332,13 @@ def room_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """
     ambient = problem.signals.get('ambient')
     surroundings = problem.model.surroundings
-    if ambient is None or any(effect.id == AmbientTemperature.id for effect in effects):
+    if (ambient is None or surroundings.drive not in (*ELECTRIC_DRIVES, 'power')
+            or any(effect.id == AmbientTemperature.id for effect in effects)):
         return np.zeros(len(problem.measured))
     typical = AmbientTemperature(
         surroundings, gain=surroundings.full_drive_squared / FULL_HEAT,
         reference=float(np.mean(ambient)))
-    own, moved = problem.simulate_many([effects, [*effects, typical]])
-    change: np.ndarray = moved - own
-    return change
+    return _change_by(typical, problem, effects)
 
 
 def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.ndarray:

@@ -283,8 +283,6 @@ def _set_ranges(model: MuscleModel, length: Measurement | None, force: Measureme
             if name is None or name not in measurement.columns:
                 continue
             values = measurement.column(name)
-            if not np.all(np.isfinite(values)):
-                continue
             low, high = model.ranges.get(name, (np.inf, -np.inf))
             model.ranges[name] = (float(min(low, values.min())), float(max(high, values.max())))
     if model.load_name is not None and length is not None:

@@ -90,21 +90,21 @@ def stage_of_places(model: MuscleModel, chain: Chain, stage: HysteresisOperator
                              f'{stage.kind} one; identify it with --operator two-stage')
     assert isinstance(model.length_stage, Preisach)     # whose copy `stage` is
     parts, excess = (tuple(column.tolist()) for column in places)
-    return copy.deepcopy(_mean(_Wire(
+    found = copy.deepcopy(_mean(_Wire(
         model.length_stage, model.force_stage, model.surroundings.full_drive_squared,
         chain.load_per_drive_squared(), _usual_load(model, chain), parts, excess, chain)))
+    found.reset()
+    return found
 
 
 @functools.lru_cache(maxsize=MOST_WIRES)
 def _mean(wire: _Wire) -> Preisach:
-    """Return H2 of the whole wire, whose memory is not looked at."""
+    """Return H2 of the whole wire, with any memory."""
     stage = wire.second
     drives, levels = _first_stage(wire)
     cold = wire.load - levels[0]
     if not stage.lower < cold:
-        alike = copy.deepcopy(stage)
-        alike.reset()
-        return alike
+        return stage
     pad = stage.lower - (cold - stage.lower) * np.arange(INTERVALS, 0, -1) / INTERVALS
     nodes = np.concatenate((pad, stage.nodes))
     felt = np.interp(wire.load - nodes, levels, drives)
