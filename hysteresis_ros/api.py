@@ -125,7 +125,7 @@ def identify(length: Source | None = None, force: Source | None = None, *,
              length_trials: Sequence[float] | None = None,
              geometry: Geometry | None = None, levels: tuple[int, int] = (10, 20),
              operator: str | None = None, anchored: bool = False,
-             effects: str | Sequence[str] | None = None, jobs: int = 1,
+             effects: str | Sequence[str] | None = None, jobs: int = -1,
              progress: Progress | None = None) -> Identified:
     """
     Identify a model of a muscle from bench tables.
@@ -238,7 +238,7 @@ def diagnose(model: Model, data: Sources, effects: str | Sequence[str] | None = 
     effects : str or sequence of str, optional
         Effects to try; by default the whole catalogue.
     jobs : int
-        Threads, or on bench tables processes; -1 for one on each core.
+        Processes; -1 for one on each core.
     seed : int
         Of the random draws behind the p values.
     progress : callable, optional

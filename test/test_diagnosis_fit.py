@@ -223,13 +223,14 @@ def test_several_sets_in_one_batch_are_fitted_as_each_by_itself(loaded):
 
 
 def test_fits_are_the_same_whatever_the_jobs(model):
-    """Threads share the simulations and nothing else."""
+    """Forks know what was known before all of them, and of phases they begin with no others."""
     measured = noisy(model, [effect_of(model, 'payload_error', dm=15.0)])
     vectors = []
     for jobs in (1, 2):
         fitter = fitter_of(model, measured, jobs)
         vectors.append([fit.vector for fit in fitter.fit(
-            [[neutral(fitter, name)] for name in ('payload_error', 'supply_sag')],
+            [[neutral(fitter, name)] for name in (
+                'payload_error', 'resistance_change', 'supply_sag', 'latent_heat') * 2],
             fitter.covariance.points[0])])
     for one, two in zip(*vectors):
         assert np.array_equal(one, two)

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 
+from joblib.externals.loky import reusable_executor
 from model_support import arm_run, bicep_model
 import numpy as np
 import pytest
@@ -19,8 +20,21 @@ from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.measurements import Measurement
-from hysteresis_ros.workers import delayed, in_parallel, one_blas_thread
+from hysteresis_ros.workers import (
+    cores, delayed, forks, in_parallel, map_in_forks, one_blas_thread, threads as threads_for)
 
+MAPPING = """
+import os, sys, time
+from hysteresis_ros.workers import map_in_forks
+
+def work(folder):
+    open(os.path.join(folder, str(os.getpid())), 'w').close()
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        pass
+
+map_in_forks(work, [sys.argv[1]] * 4, 2)
+"""
 # Four each: their own time is a part of a second.
 WORKING = """
 import os, sys, time
@@ -144,11 +158,97 @@ def test_results_come_in_the_order_of_the_tasks():
         assert list(in_parallel(tasks, jobs)) == [None, (3, 1), [2, 1]]
 
 
+@pytest.fixture
+def alone():
+    """End the threads that look after workers."""
+    reusable_executor.get_reusable_executor().shutdown(wait=True)
+
+
+def worked(item):
+    """Return who does an item, so slowly that others take some, too."""
+    time.sleep(0.02)
+    return item, os.getpid()
+
+
+def test_forks_do_a_part_and_results_come_in_order(alone):
+    """Whoever does an item; what a fork knows needs not be sent to it."""
+    scale = 3
+    found = map_in_forks(lambda item: worked(scale * item), range(20), 3)
+    assert [item for item, _ in found] == list(range(0, 60, 3))
+    assert len({process for _, process in found}) == 3
+
+
+def test_more_items_than_fit_into_a_pipe_are_all_done(alone):
+    """A pipe holds 64 kB until somebody reads."""
+    count = 40_000
+    assert map_in_forks(lambda item: bytes(100) + bytes(item % 7), range(count), 2) == [
+        bytes(100) + bytes(item % 7) for item in range(count)]
+
+
+def test_what_a_fork_fails_at_is_done_here(alone):
+    """It dies, raises, or has a result that cannot be sent."""
+    here = os.getpid()
+
+    def fails(item):
+        time.sleep(0.02)
+        if os.getpid() == here:
+            return lambda: item
+        if item % 3 == 0:
+            os._exit(1)
+        if item % 3 == 1:
+            raise ValueError
+        return lambda: item
+
+    assert [found() for found in map_in_forks(fails, range(12), 2)] == list(range(12))
+
+
+def test_an_error_is_raised_and_leaves_no_fork_behind(alone):
+    """As without forks."""
+    def fail(item):
+        time.sleep(0.02)
+        raise ValueError(item)
+
+    before = children()
+    with pytest.raises(ValueError, match='^[0-3]$'):
+        map_in_forks(fail, range(4), 2)
+    assert forks(2) == 2
+    deadline = time.monotonic() + 10.0
+    while children() - before:
+        assert time.monotonic() < deadline, 'forks are left'
+        time.sleep(0.01)
+
+
+def children():
+    """Return the processes that this one has forked and that still run."""
+    tasks = Path('/proc/self/task').glob('*/children')
+    return {int(child) for task in tasks for child in task.read_text(encoding='ascii').split()
+            if alive(int(child))}
+
+
+def test_nothing_is_forked_beside_other_threads(alone):
+    """Their locks would never be opened in a fork; nor are there forks of forks."""
+    ended = threading.Event()
+    thread = threading.Thread(target=ended.wait)
+    thread.start()
+    try:
+        assert forks(2) == 1
+        assert {process for _, process in map_in_forks(worked, range(4), 2)} == {os.getpid()}
+    finally:
+        ended.set()
+        thread.join()
+    assert forks(2) == 2 and forks(-1) == cores()
+    inside = map_in_forks(lambda item: (forks(2), threads_for(2), worked(item)[1]), range(8), 2)
+    assert all(one[:2] == (1, 1) for one in inside)
+    assert len({one[2] for one in inside}) == 2
+    assert threads_for(2) == 2
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize('program', [WORKING, MAPPING])
 @pytest.mark.skipif(not Path('/proc').is_dir(), reason='processes are looked up in /proc')
-def test_workers_end_when_their_parent_is_killed(root, tmp_path):
+def test_workers_end_when_their_parent_is_killed(root, tmp_path, program):
     """SIGKILL leaves no time to tell them, and a batch system uses it."""
-    parent = subprocess.Popen([sys.executable, '-c', WORKING, str(tmp_path)], cwd=root)
+    parent = subprocess.Popen([sys.executable, '-c', program, str(tmp_path)], cwd=root)
     try:
         workers = set()
         deadline = time.monotonic() + 60.0

@@ -9,7 +9,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_columns, add_json, bench_tables, count, numbers, say, Steps, Subparsers, warn,
+    add_columns, add_json, bench_tables, count, numbers, processes, say, Steps, Subparsers, warn,
     write_json)
 from hysteresis_ros.cli.outputs import InputPath, OutputFile
 from hysteresis_ros.cli.rounds import BENCH, Rounds
@@ -51,6 +51,8 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
                         'those that the tables prove (auto), or those named')
     parser.add_argument('--anchored', action='store_true',
                         help='tie H1(0) to the pretension and H2(0) to zero')
+    parser.add_argument('--jobs', type=processes, default=-1, metavar='N',
+                        help='processes for --effects (default: -1, one for each core)')
     parser.add_argument('-o', '--output', type=OutputFile, required=True, metavar='MODEL.yaml')
     add_json(parser)
     return parser
@@ -77,7 +79,7 @@ def run(args: argparse.Namespace) -> None:
     found = identify(length, force, force_trials=args.force_trials,
                      length_trials=args.length_trials, geometry=args.geometry,
                      levels=args.levels, operator=args.operator, anchored=args.anchored,
-                     effects=args.effects, progress=rounds)
+                     effects=args.effects, jobs=args.jobs, progress=rounds)
     rounds.close()
     steps.clear()
     found.model.save(args.output)

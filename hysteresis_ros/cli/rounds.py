@@ -51,6 +51,8 @@ class Rounds:
                 else f'round {self.begun + 1}')
         self.begun += 1
         if self._bar is None:
+            # Beside its thread, which wakes up bars that stand still, no process is forked.
+            tqdm.monitor_interval = 0
             # Without smoothing the time left rests on all that was done so far.
             self._bar = tqdm(total=0, file=self.stream, leave=False, smoothing=0)
         self._bar.total += total

@@ -1,12 +1,11 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Fit effects to runs of an arm: maximum a posteriori, in whitened residuals, many sets at once.
+Fit effects to runs of an arm: maximum a posteriori, in whitened residuals.
 
-Gauss-Newton steps with Levenberg's damping. All sets advance together, so that each step is one
-batch of simulations, whatever their number. For a first look at a set, derivatives are differences
+Gauss-Newton steps with Levenberg's damping. For a first look at a set, derivatives are differences
 at the start and carried on by secants from there (Broyden's update; Madsen, Nielsen and Tingleff,
-Methods for non-linear least squares problems, 2004, sec. 3.5).
+Methods for non-linear least squares problems, 2004, sec. 3.5). Sets are shared between processes.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 import dataclasses
 import math
-from typing import Any, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from hysteresis_ros.diagnosis.covariance import Covariance, noise_of, Point
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector
 from hysteresis_ros.effects import Effect
+from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -39,6 +39,8 @@ LEAST_GAIN = 0.1
 LONGEST = 1.0
 # The base model's own error bends an estimate by up to about this share.
 ESTIMATE_SLACK = 0.15
+# A fit without its covariance, that covariance's discrepancy, and phases to keep.
+Answer: TypeAlias = 'tuple[Fit, Discrepancy | None, list[np.ndarray | None]]'
 # Standard deviations to each side of a 95 % interval.
 FACTOR = 1.96
 
@@ -209,8 +211,7 @@ class Fitter:
     def simulate(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
         """Return the responses (len(sets), n) with sets of effects added to the model's own."""
         with np.errstate(all='ignore'):
-            return self.problem.simulate_many(
-                [[*unaffected(self.fixed, effects), *effects] for effects in sets])
+            return self.problem.simulate_many([self._all(effects) for effects in sets])
 
     def error(self, predicted: np.ndarray) -> float:
         """Return the root mean square error of a response (n,), in its unit."""
@@ -236,53 +237,90 @@ class Fitter:
         -------
         list of Fit
         """
-        walks = [_Walk(effects, self.problem.kind) for effects in sets]
-        for walk, own in zip(walks, self._at(walks, [[w.vector] for w in walks])):
-            walk.predicted = own[0]
-            walk.cost = self._cost(walk, walk.vector, own[0], point)
-            walk.active = math.isfinite(walk.cost)
-        walks = [walk for walk in walks if walk.active]
+        fits = self.in_forks(lambda effects: self.fit_one(effects, point, steps, exact), sets)
+        return [fit for fit in fits if fit is not None]
+
+    def fit_one(self, effects: Sequence[Effect], point: Point, steps: int = MOST_STEPS,
+                exact: bool = True) -> Fit | None:
+        """Fit one set of effects; None if its simulation fails. See `fit`."""
+        walk = _Walk(effects, self.problem.kind)
+        walk.predicted, = self._at(walk, [walk.vector])
+        walk.cost = self._cost(walk, walk.vector, walk.predicted, point)
+        if not math.isfinite(walk.cost):
+            return None
         for _ in range(steps):
-            active = [walk for walk in walks if walk.active]
-            if not active:
+            if walk.jacobian is None:
+                self._differentiate(walk)
+            if not walk.active or not len(walk.vector):
                 break
-            self._differentiate([walk for walk in active if walk.jacobian is None])
-            active = [walk for walk in active if walk.active and len(walk.vector)]
-            steps_of = [walk.candidate(point.whiten(walk.jacobian), point.whiten(
-                self.problem.measured - walk.predicted)) for walk in active]
-            moves = []
-            for walk, (vector, saved) in zip(active, steps_of):
-                if saved > 2.0 * LEAST_GAIN:
-                    moves.append((walk, vector))
-                else:
-                    walk.doubt()
-            for (walk, vector), (predicted,) in zip(moves, self._at(
-                    [walk for walk, _ in moves], [[vector] for _, vector in moves])):
-                walk.step_to(vector, predicted, self._cost(walk, vector, predicted, point))
-                if exact and not walk.fresh:
-                    walk.jacobian = None
-        self._differentiate([walk for walk in walks if walk.jacobian is None])
-        return [self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
-                               walk.predicted, walk.jacobian, duration=self.problem.duration))
-                for walk in walks if np.all(np.isfinite(walk.jacobian))]
+            vector, saved = walk.candidate(
+                point.whiten(walk.jacobian), point.whiten(self.problem.measured - walk.predicted))
+            if saved <= 2.0 * LEAST_GAIN:
+                walk.doubt()
+                continue
+            predicted, = self._at(walk, [vector])
+            walk.step_to(vector, predicted, self._cost(walk, vector, predicted, point))
+            if exact and not walk.fresh:
+                walk.jacobian = None
+        if walk.jacobian is None:
+            self._differentiate(walk)
+        if not np.all(np.isfinite(walk.jacobian)):
+            return None
+        return self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
+                              walk.predicted, walk.jacobian, duration=self.problem.duration))
 
-    def _at(self, walks: Sequence[_Walk], vectors: Sequence[Sequence[np.ndarray]]
-            ) -> list[list[np.ndarray]]:
-        """Return for each walk the responses at its vectors."""
-        responses = iter(self.simulate([walk.parameters.with_vector(vector)
-                                        for walk, own in zip(walks, vectors) for vector in own]))
-        return [[next(responses) for _ in own] for own in vectors]
+    def in_forks(self, fit: Callable[[Sequence[Effect]], Fit | None],
+                 sets: Sequence[Sequence[Effect]]) -> list[Fit | None]:
+        """
+        Return what `fit` makes of each set of effects, shared with forks where that can be.
 
-    def _differentiate(self, walks: Sequence[_Walk]) -> None:
-        walks = [walk for walk in walks if walk.jacobian is None]
-        moved = [walk.moved() for walk in walks]
-        responses = self._at(walks, [vectors for vectors, _ in moved])
-        for walk, (_, steps), own in zip(walks, moved, responses):
-            walk.jacobian = np.zeros((len(walk.predicted), len(steps)))
-            for index, (step, response) in enumerate(zip(steps, own)):
-                walk.jacobian[:, index] = (response - walk.predicted) / step
-            walk.fresh = True
-            walk.active = walk.active and bool(np.all(np.isfinite(walk.jacobian)))
+        Each begins with the phases known before all of them, whoever comes first.
+
+        Parameters
+        ----------
+        fit : callable
+            Of a set of effects, to a `Fit` or None.
+        sets : sequence of list of Effect
+
+        Returns
+        -------
+        list of Fit or None
+        """
+        def answer(effects: Sequence[Effect]) -> Answer | None:
+            with self.problem.no_phases_kept():
+                found = fit(effects)
+                if found is None:
+                    return None
+                phases = self.problem.phases(self._all(found.effects))
+            if found.covariance is None:
+                return found, None, phases
+            # A covariance is large, and all but its discrepancy is known here.
+            return dataclasses.replace(found, covariance=None), found.covariance.discrepancy, phases
+
+        fits: list[Fit | None] = []
+        for one in map_in_forks(answer, sets, self.problem.jobs):
+            found, discrepancy, phases = one or (None, None, [])
+            if found is not None:
+                self.problem.keep_phases(self._all(found.effects), phases)
+                if discrepancy is not None:
+                    found = dataclasses.replace(found, covariance=self.covariance.of(discrepancy))
+            fits.append(found)
+        return fits
+
+    def _all(self, effects: Sequence[Effect]) -> list[Effect]:
+        """Return the effects of the model with further ones."""
+        return [*unaffected(self.fixed, effects), *effects]
+
+    def _at(self, walk: _Walk, vectors: Sequence[np.ndarray]) -> np.ndarray:
+        """Return the responses (len(vectors), n) of a walk at its vectors."""
+        return self.simulate([walk.parameters.with_vector(vector) for vector in vectors])
+
+    def _differentiate(self, walk: _Walk) -> None:
+        vectors, steps = walk.moved()
+        walk.jacobian = ((self._at(walk, vectors) - walk.predicted).T / np.array(steps)
+                         if steps else np.zeros((len(walk.predicted), 0)))
+        walk.fresh = True
+        walk.active = walk.active and bool(np.all(np.isfinite(walk.jacobian)))
 
     def _cost(self, walk: _Walk, vector: np.ndarray, predicted: np.ndarray, point: Point) -> float:
         """Return minus twice the log posterior at a vector (k,), but for a constant."""
@@ -400,19 +438,20 @@ class Fitter:
         """
         fits = list(fits)
         folds = self.problem.folds
-        walks, vectors = [], []
+        sets, counts = [], []
         for fit in fits:
             walk = _Walk(fit.effects, self.problem.kind)
             walk.vector = fit.vector
-            own: list[np.ndarray] = []
+            own: list[list[Effect]] = []
             for fold in folds if len(fit.vector) else ():
                 step = self._step(fit, walk, self.problem.fold != fold)
-                own += [np.clip(fit.vector + part * step, walk.parameters.lower,
-                                walk.parameters.upper) for part in (1.0, 0.25)]
-            walks.append(walk)
-            vectors.append(own)
+                own += [walk.parameters.with_vector(np.clip(
+                    fit.vector + part * step, walk.parameters.lower, walk.parameters.upper))
+                    for part in (1.0, 0.25)]
+            sets += own
+            counts.append(len(own))
         found = []
-        for fit, responses in zip(fits, self._at(walks, vectors)):
+        for fit, responses in zip(fits, np.split(self.simulate(sets), np.cumsum(counts)[:-1])):
             held_out = fit.predicted.copy()
             for index, fold in enumerate(folds if len(fit.vector) else ()):
                 test = self.problem.fold == fold

@@ -8,9 +8,10 @@ Refitted weights would absorb most of what an effect does.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+import contextlib
 import dataclasses
-import os
+import itertools
 from typing import Literal, TYPE_CHECKING
 
 import numpy as np
@@ -19,16 +20,24 @@ from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.diagnosis.discrepancy import Offset
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.identification.operators import preisach_rows
-from hysteresis_ros.model.simulation import Simulator
+from hysteresis_ros.model.simulation import Simulator, WORTH_THREADS
 from hysteresis_ros.operators import Preisach
+from hysteresis_ros.workers import forks, map_in_forks, threads
 
 if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
     from hysteresis_ros.model import MuscleModel
 
-
+# Rows that are simulated, and as many more for each simulation as it takes besides, from which on
+# forks pay: it takes ten ms to make and end one.
+WORTH_FORKS = 50_000
 # Responses that are kept: a fit often begins where another one was.
 MOST_KEPT = 4000
+
+
+def needs_phase(effects: Sequence[Effect]) -> bool:
+    """Whether a simulation begins with the phase of a similar one before, so that order counts."""
+    return any(effect.needs_phase for effect in effects)
 
 
 class ArmProblem(Problem):
@@ -80,15 +89,51 @@ class ArmProblem(Problem):
             self._known.clear()
         for index in new:
             # A phase is sought from that of the run before, so that these differ a little.
-            if not any(effect.needs_phase for effect in sets[index]):
+            if not needs_phase(sets[index]):
                 self._known[keys[index]] = found[index]
         return np.array(responses).reshape(len(sets), len(self.measured))
 
     def _simulate_new(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
-        jobs = self.jobs if self.jobs > 0 else os.cpu_count() or 1
-        runs = [simulator.run_many(sets, jobs)[:, rows]
+        """Return the response (len(sets), n) of the judged rows for sets that are not known."""
+        rows = sum(measurement.rows for measurement in self.measurements)
+        if forks(self.jobs) < 2 or len(sets) * (rows + WORTH_THREADS) < WORTH_FORKS:
+            return self._run_many(sets)
+        found = map_in_forks(self._apart, sets, self.jobs)
+        for effects, (_, phases) in zip(sets, found):
+            self.keep_phases(effects, phases)
+        return np.array([response for response, _ in found])
+
+    def _run_many(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
+        runs = [simulator.run_many(sets, threads(self.jobs))[:, rows]
                 for simulator, rows in zip(self.simulators, self.chosen)]
         return np.concatenate(runs, axis=1)
+
+    def _apart(self, effects: Sequence[Effect]) -> tuple[np.ndarray, list[np.ndarray | None]]:
+        """Return the response of the judged rows, and the phases for `keep_phases`."""
+        runs = [simulator.run_apart(effects) for simulator in self.simulators]
+        return self.pick([response for response, _ in runs]), [phase for _, phase in runs]
+
+    def phases(self, effects: Sequence[Effect]) -> list[np.ndarray | None]:
+        """Return the phases of each recording (rows,) that a run with these effects begins with."""
+        if not needs_phase(effects):
+            return [None] * len(self.simulators)
+        return [simulator.known_phases.nearest(effects) for simulator in self.simulators]
+
+    def keep_phases(self, effects: Sequence[Effect], phases: Sequence[np.ndarray | None]) -> None:
+        """Keep phases of each recording (rows,) for runs with similar effects to begin with."""
+        for simulator, phase in zip(self.simulators, phases):
+            simulator.known_phases.keep(effects, phase)
+
+    @contextlib.contextmanager
+    def no_phases_kept(self) -> Iterator[None]:
+        """Forget in the end the phases that runs have kept in the meantime."""
+        simulators = [*self.simulators, *itertools.chain(*self._replicated)]
+        known = [simulator.known_phases.copy() for simulator in simulators]
+        try:
+            yield
+        finally:
+            for simulator, one in zip(simulators, known):
+                simulator.known_phases = one
 
     def simulate_replicates(self, effects: Sequence[Effect]) -> np.ndarray:
         """

@@ -9,7 +9,8 @@ the answer, `bench_selection` says.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+import functools
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from hysteresis_ros.diagnosis.forms import other_forms
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.effects import catalogue, Effect
-from hysteresis_ros.workers import delayed, in_parallel
+from hysteresis_ros.workers import chosen_backend, delayed, map_in_forks, forks, in_parallel
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.bench_problem import BenchProblem
@@ -149,8 +150,12 @@ class BenchSearch:
 
     def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None], fitter: BenchFitter,
                      items: Sequence) -> list[Fit]:
-        tasks = [delayed(task)(fitter, item) for item in items]
-        results = self._progress(in_parallel(tasks, self._jobs), len(tasks))
+        results: Iterable[Fit | None]
+        if chosen_backend() or self._jobs != 1 and forks(self._jobs) < 2:
+            results = in_parallel([delayed(task)(fitter, item) for item in items], self._jobs)
+        else:
+            results = map_in_forks(functools.partial(task, fitter), items, self._jobs)
+        results = self._progress(results, len(items))
         return [fit for fit in results if fit is not None]
 
 

@@ -49,7 +49,8 @@ def diagnose(model: MuscleModel, measurements: Sequence[Measurement],
     effects : sequence of str, optional
         Effects to try; by default the whole catalogue.
     jobs : int
-        Threads, or on bench tables processes; -1 for all cores.
+        Processes; -1 for all cores. Beside other threads, as in a notebook, long simulations of an
+        arm are shared between threads instead.
     seed : int
         Of the random draws behind the p values and the intervals of the gains.
     settings : Settings

@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.residual import heteroscedasticity_p_value
+from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
@@ -23,6 +25,8 @@ SIGNIFICANCE = 0.05
 # The same for noise that is not as large at all times: so many noisy recordings are called unknown
 # by chance.
 NOISE_SIGNIFICANCE = 0.01
+# What of a `Fit` its judgement says.
+JUDGED = ('log_evidence', 'values', 'spread', 'judged')
 
 
 class FittedSets:
@@ -63,8 +67,6 @@ class FittedSets:
         # Each with the response that it belongs to.
         self._errors: dict[frozenset[str], tuple[np.ndarray, float, float]] = {}
         self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
-        # Of its own, or all other draws would depend on whether this one is needed.
-        self._noise_rng, = rng.spawn(1)
         # The same draws for all, or chance would decide between two sets.
         self._seed = int(rng.integers(2 ** 32))
         self.rmse_95 = self._largest_error(self.covariance)
@@ -83,7 +85,13 @@ class FittedSets:
 
     def judge_all(self) -> None:
         """Judge all fits under the covariances that are at hand now."""
-        self.fits = {names: self.fitter.judge(fit) for names, fit in self.fits.items()}
+        def judged(names: frozenset[str]) -> dict[str, Any]:
+            fit = self.fitter.judge(self.fits[names])
+            return {name: getattr(fit, name) for name in JUDGED}
+
+        found = map_in_forks(judged, self.fits, self.problem.jobs)
+        self.fits = {names: dataclasses.replace(fit, **own)
+                     for (names, fit), own in zip(self.fits.items(), found)}
 
     def keep_least(self, names: frozenset[str], predicted: np.ndarray) -> None:
         """Keep the response (n,) of a set that was fitted by least squares."""
@@ -167,8 +175,8 @@ class FittedSets:
         known = self._noise_p_values.get(names)
         if known is None or known[0] is not fit.predicted:
             p_value = heteroscedasticity_p_value(
-                self.problem.measured - fit.predicted, self.problem.trial, self._noise_rng,
-                self.settings.draws)
+                self.problem.measured - fit.predicted, self.problem.trial,
+                np.random.default_rng(self._seed), self.settings.draws)
             self._noise_p_values[names] = known = (fit.predicted, p_value)
         return known[1]
 

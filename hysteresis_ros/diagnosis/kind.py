@@ -29,7 +29,7 @@ def problem_for(model: MuscleModel, measurements: Iterable[Measurement],
     effects : sequence of str, optional
         Effects to try; by default the whole catalogue.
     jobs : int
-        Threads for the simulations; -1 for all cores.
+        Processes for the fits; -1 for all cores.
 
     Returns
     -------

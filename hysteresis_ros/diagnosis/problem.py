@@ -67,7 +67,7 @@ class Problem:
 
     # Effects to try; None for the whole catalogue.
     catalogue: tuple[str, ...] | None = None
-    # Threads for the simulations; -1 for all cores.
+    # Processes for the fits; -1 for all cores.
     jobs: int = 1
 
     def __init__(self, model: MuscleModel, measurements: Sequence[Measurement]) -> None:

@@ -321,8 +321,14 @@ class Selection:
 
     def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
-        for fit in self.fitter.fit(sets, self._metric()):
-            self.sets.keep(self.fitter.polished(self.fitter.along(fit)))
+        for fit in self.fitter.in_forks(self._fitted, sets):
+            if fit is not None:
+                self.sets.keep(fit)
+
+    def _fitted(self, effects: Sequence[Effect]) -> Fit | None:
+        """Return a set fitted to the end and judged along its own way, None if that fails."""
+        fit = self.fitter.fit_one(effects, self._metric())
+        return fit and self.fitter.polished(self.fitter.along(fit))
 
     def _metric(self) -> Point:
         """Return the covariance in whose units fits are made: the expected discrepancy's."""

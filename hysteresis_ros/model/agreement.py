@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+import copy
 import dataclasses
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,12 @@ class KnownPhases:
         # Of each run the values of all parameters that have occurred, NaN of those absent.
         self._places: dict[tuple[str, str], int] = {}
         self._values = np.zeros((1, 0))
+
+    def copy(self) -> KnownPhases:
+        """Return what is known now, to go back to."""
+        other = copy.copy(self)
+        other._phases, other._places = self._phases.copy(), dict(self._places)
+        return other
 
     def keep(self, effects: Sequence[Effect], phase: np.ndarray | None) -> None:
         """Keep the phase (rows,) of a run, if it has needed one."""

@@ -79,6 +79,11 @@ class Simulator:
         Effects that act in the rows of an arm run that lie before the onset of all others; see
         `model.onset`. By default there is no onset.
 
+    Attributes
+    ----------
+    known_phases : KnownPhases
+        Of the runs before, from which those of similar effects begin.
+
     Raises
     ------
     MeasurementError
@@ -101,7 +106,7 @@ class Simulator:
             self._asked[judged] = True
         self._surroundings = model.surroundings
         self._balances: dict[tuple, ArmBalance] = {}
-        self._phases = KnownPhases(measurement.rows)
+        self.known_phases = KnownPhases(measurement.rows)
         self._statics = None
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
@@ -130,20 +135,29 @@ class Simulator:
         ParameterError, ModelFileError
             If the model lacks what this kind of measurement needs.
         """
-        response, phase = self._run(effects, inputs_of_stage, exact)
-        self._phases.keep(effects, phase)
+        response, phase = self.run_apart(effects, inputs_of_stage, exact)
+        self.known_phases.keep(effects, phase)
         return response
 
-    def _run(self, effects: Sequence[Effect], inputs_of_stage: list[np.ndarray] | None = None,
-             exact: bool = False) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return the response, and the martensite share where effects need it, each (rows,)."""
+    def run_apart(self, effects: Sequence[Effect],
+                  inputs_of_stage: list[np.ndarray] | None = None, exact: bool = False
+                  ) -> tuple[np.ndarray, np.ndarray | None]:
+        """
+        Simulate with these effects, and leave no trace in the phases known; see `run`.
+
+        Returns
+        -------
+        response : ndarray, shape (rows,)
+        phase : ndarray, shape (rows,), or None
+            The martensite share, where effects need it.
+        """
         chain = Chain(effects, self._surroundings)
         past = self.past(effects)
         respond = self._responder(chain, exact, past)
         result = np.empty(self.measurement.rows)
         phase = None
         if chain.needs_phase:
-            known = self._phases.nearest(effects)
+            known = self.known_phases.nearest(effects)
             found = self._agree(chain, respond, np.ones_like(known) if exact else known, exact)
             phase = known.copy()
             for one in found:
@@ -208,12 +222,12 @@ class Simulator:
         """
         if jobs > 1 and len(sets) > 1 and self.measurement.rows >= WORTH_THREADS:
             with ThreadPoolExecutor(min(jobs, len(sets))) as pool:
-                found = list(pool.map(self._run, sets))
+                found = list(pool.map(self.run_apart, sets))
         else:
-            found = [self._run(effects) for effects in sets]
+            found = [self.run_apart(effects) for effects in sets]
         # Not before all have run, or the result would depend on who comes first.
         for effects, (_, phase) in zip(sets, found):
-            self._phases.keep(effects, phase)
+            self.known_phases.keep(effects, phase)
         return np.array([row for row, _ in found]).reshape(len(sets), self.measurement.rows)
 
     @staticmethod
