@@ -222,7 +222,7 @@ class MuscleModel:
         ModelFileError
             If the model has no length stage.
         """
-        geometry, stage = self.require_geometry(), self.require_length_stage(chain)
+        geometry, stage = self.require_geometry(), self._stage_of_places(chain)
         loaded = self.first_stage(chain).loaded
         if self.sign > 0:
             raise ParameterError('the model is of a muscle that extends when driven; the bicep '
@@ -281,9 +281,13 @@ class MuscleModel:
         ParameterError
             If it has one of which they cannot.
         """
-        operator = copy.deepcopy(self._length_stage())
+        operator = copy.deepcopy(
+            self._length_stage() if chain is None else self._stage_of_places(chain))
         operator.reset()
-        return operator if chain is None else stage_of_places(self, chain, operator)
+        return operator
+
+    def _stage_of_places(self, chain: Chain) -> HysteresisOperator:
+        return stage_of_places(self, chain, self._length_stage())
 
     def require_length_range(self) -> tuple[float, float]:
         """Return what H2 can give; ModelFileError if the model has none."""

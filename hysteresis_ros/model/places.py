@@ -17,7 +17,6 @@ has hysteresis.
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import functools
 from typing import TYPE_CHECKING
@@ -64,7 +63,7 @@ class _Wire:
 def stage_of_places(model: MuscleModel, chain: Chain, stage: HysteresisOperator
                     ) -> HysteresisOperator:
     """
-    Return H2 of the whole wire.
+    Return H2 of the whole wire, with any memory, for others to copy.
 
     Parameters
     ----------
@@ -73,8 +72,7 @@ def stage_of_places(model: MuscleModel, chain: Chain, stage: HysteresisOperator
     chain : Chain
         Its effects.
     stage : HysteresisOperator
-        H2 of a wire that is equally warm everywhere, with its memory wiped; it is returned where
-        the effects leave it so.
+        H2 of a wire that is equally warm everywhere; it is returned where the effects leave it so.
 
     Raises
     ------
@@ -88,13 +86,10 @@ def stage_of_places(model: MuscleModel, chain: Chain, stage: HysteresisOperator
         raise ParameterError('a wire with cold ends (effect cold_clamps) needs a Preisach length '
                              'stage of a muscle that contracts when driven, not a '
                              f'{stage.kind} one; identify it with --operator two-stage')
-    assert isinstance(model.length_stage, Preisach)     # whose copy `stage` is
     parts, excess = (tuple(column.tolist()) for column in places)
-    found = copy.deepcopy(_mean(_Wire(
-        model.length_stage, model.force_stage, model.surroundings.full_drive_squared,
-        chain.load_per_drive_squared(), _usual_load(model, chain), parts, excess, chain)))
-    found.reset()
-    return found
+    return _mean(_Wire(
+        stage, model.force_stage, model.surroundings.full_drive_squared,
+        chain.load_per_drive_squared(), _usual_load(model, chain), parts, excess, chain))
 
 
 @functools.lru_cache(maxsize=MOST_WIRES)
