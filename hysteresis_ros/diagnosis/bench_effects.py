@@ -16,6 +16,7 @@ from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.extend import extended_model
+from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.replicates import with_replicates
@@ -78,15 +79,17 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     if not rows.any():
         raise IdentificationError('no trial is left to fit')
     fitted = length.select(sorted(set(length.column('trial')[rows].tolist())))
+    problem = problem_for(model, [fitted], jobs=jobs)
+    assert isinstance(problem, BenchProblem)
     if names is None:
         found = diagnose(model, [fitted], jobs=jobs, progress=progress).effects
-        extended, added = _determined(model, found, fitted)
+        extended, added = _determined(model, found, problem)
     elif names:
         extended, added = extended_model(model, names, [fitted])
     else:
         return model, []
     if added:
-        extended = with_replicates(extended, BenchProblem(model, [fitted]))
+        extended = with_replicates(extended, problem)
     metrics = measure(extended, force, force_trials, length, length_trials)
     # The errors of loads left out of the last fit of the weights stay with the new ones.
     for name, entry in metrics.items():
@@ -94,16 +97,16 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     return dataclasses.replace(extended, metrics=metrics), added
 
 
-def _determined(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
+def _determined(model: MuscleModel, found: Sequence[Effect], problem: BenchProblem
                 ) -> tuple[MuscleModel, list[Effect]]:
     """Return the model with the effects found and usual, all of them determined by the rows."""
     excluded: list[str] = []
-    extended, added = _extended_without(excluded, model, found, fitted)
+    extended, added = _extended_without(excluded, model, found, problem)
     while undetermined := _undetermined(added):
         # What every loaded muscle has goes last.
         name = min(undetermined, key=lambda effect: effect.universal).id
-        without = _extended_without([*excluded, name], model, found, fitted)
-        rivals = {effect.id: _extended_without([*excluded, effect.id], model, found, fitted)
+        without = _extended_without([*excluded, name], model, found, problem)
+        rivals = {effect.id: _extended_without([*excluded, effect.id], model, found, problem)
                   for effect in added if effect.id != name}
         # Two effects may stand for each other, so that of neither the size is determined.
         largest = (1.0 - Settings().practical) * _left_out_rmse(without[0])
@@ -117,13 +120,13 @@ def _determined(model: MuscleModel, found: Sequence[Effect], fitted: Measurement
 
 
 def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequence[Effect],
-                      fitted: Measurement) -> tuple[MuscleModel, list[Effect]]:
+                      problem: BenchProblem) -> tuple[MuscleModel, list[Effect]]:
     """Return the model with the effects found and usual but for some, and those effects."""
     known = _with_universal(
-        model, [effect for effect in found if effect.id not in excluded], fitted, excluded)
+        model, [effect for effect in found if effect.id not in excluded], problem, excluded)
     if not known:
         return model, []
-    return extended_model(model, [one.id for one in known], [fitted], known)
+    return extended_model(model, [one.id for one in known], problem.measurements, known)
 
 
 def _undetermined(effects: Sequence[Effect]) -> list[Effect]:
@@ -138,7 +141,7 @@ def _left_out_rmse(model: MuscleModel) -> float:
     return float(entry.get('rmse', np.inf))
 
 
-def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measurement,
+def _with_universal(model: MuscleModel, found: Sequence[Effect], problem: BenchProblem,
                     excluded: Collection[str] = ()) -> list[Effect]:
     """
     Return the effects found, and those that every loaded muscle has where they do no harm.
@@ -148,7 +151,7 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
     known beforehand needs no proof against chance, only rows that determine its parameters, be it
     those that are held out, and that do not speak against it.
     """
-    fitter = BenchFitter(BenchProblem(model, [fitted]).finer())
+    fitter = BenchFitter(problem.finer())
     names = [effect.id for effect in found]
     rest = usual([kind(model.surroundings) for name, kind in catalogue().items()
                   if kind.universal and name not in (*names, *excluded)
@@ -191,6 +194,6 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], fitted: Measure
             continue
         lost = [one.id for one in _undetermined(effects) if not one.universal]
         # What only explained the residual of another effect leaves its range once that is there.
-        return _with_universal(model, [one for one in found if one.id not in lost], fitted,
-                               excluded) if lost else effects
+        return _with_universal(model, [one for one in found if one.id not in lost],
+                               problem, excluded) if lost else effects
     return list(found)

@@ -15,6 +15,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.effects import Effect, Parameter
+from hysteresis_ros.workers import map_in_forks
 
 # Values over the physical range at which held-out rows are predicted, and of the posterior density.
 VALUES, POSTERIOR = 7, 601
@@ -67,7 +68,7 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
         return other.error(other.cross_validate(other.fit(known)).held_out)
 
     values = np.geomspace(free[0].low, free[0].high, VALUES)
-    errors = np.array([error_at(value) for value in values.tolist()])
+    errors = np.array(map_in_forks(error_at, values.tolist(), fitter.problem.jobs))
     best = int(np.argmin(errors))
     if best in (0, len(values) - 1):
         return None

@@ -4,15 +4,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 import dataclasses
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import MOST_EVALUATIONS, Response, TOLERANCE
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.identification.least_squares import folds_of
 from hysteresis_ros.model.replicates import Replicate
 from hysteresis_ros.operators import Preisach
+from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
@@ -38,17 +40,17 @@ def with_replicates(model: MuscleModel, problem: BenchProblem, by_hand: bool = F
     -------
     MuscleModel
     """
-    return dataclasses.replace(model, replicates=list(_replicates(model, problem, by_hand)))
-
-
-def _replicates(model: MuscleModel, problem: BenchProblem, by_hand: bool
-                ) -> Iterator[Replicate]:
     stage, finer = model.length_stage, problem.finer()
     assert isinstance(stage, Preisach)      # no other one has effects on a bench
-    for left_out in folds_of(problem.left_out_together):
+    levels = len(stage.nodes) - 1
+
+    def replicate(left_out: np.ndarray) -> Replicate:
         effects = model.effects
         if not by_hand:
             response = Response(finer, [], effects, ~left_out)
             effects = response.parameters.with_vector(response.minimise(
                 response.parameters.vector(), MOST_EVALUATIONS, TOLERANCE))
-        yield Replicate(problem.stage(effects, len(stage.nodes) - 1, ~left_out), effects)
+        return Replicate(problem.stage(effects, levels, ~left_out), effects)
+
+    return dataclasses.replace(model, replicates=map_in_forks(
+        replicate, folds_of(problem.left_out_together), problem.jobs))
