@@ -104,7 +104,7 @@ def stroke_of(material):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', [3, 4])
+@pytest.mark.parametrize('seed', [3, pytest.param(4, marks=pytest.mark.long)])
 def test_it_is_named_where_the_moduli_differ_and_no_growth_of_the_strain(seed):
     material, (model, added) = bench_of(MODULI, seed)
     found = {effect.id: effect for effect in added}
@@ -118,7 +118,7 @@ def test_it_is_named_where_the_moduli_differ_and_no_growth_of_the_strain(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', [3, 4])
+@pytest.mark.parametrize('seed', [3, pytest.param(4, marks=pytest.mark.long)])
 def test_it_is_not_named_where_the_moduli_are_equal(seed):
     _, (model, added) = bench_of((30e9, 30e9), seed)
     names = {effect.id for effect in added}

@@ -85,6 +85,7 @@ def test_trials_are_left_out_where_all_have_one_load_and_parts_of_a_single_trial
     assert len(with_replicates(base, single).replicates) > 1
 
 
+@pytest.mark.slow
 def test_extending_a_bench_model_identifies_its_replicates_anew(model, tables):
     fitted = tables[0].select(range(4))
     base = model.with_effects([one for one in model.effects if one.id != 'series_compliance'])
