@@ -395,7 +395,7 @@ def test_what_is_reached_exactly_is_not_called_saturated(name):
     controller.setpoint(-0.008, 3.0)
     drives = np.clip(rng.uniform(-1.0, 7.0, 200), 0.0, 6.0)
     for volts, force in zip(drives.tolist(), rng.uniform(1.0, 8.0, 200).tolist()):
-        length = controller._outcome(volts, force, controller._inputs(0.0, 0.5)).length
+        length = controller._length.outcome(volts, force, controller._inputs(0.0, 0.5)).length
         found = controller.setpoint(length, force)
         assert abs(found.error) < 1e-9
         assert not found.saturated and found.reason == ''

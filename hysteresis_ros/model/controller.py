@@ -16,17 +16,13 @@ from hysteresis_ros.effects import Inputs
 from hysteresis_ros.effects.thermal import FirstOrderLag, LatentHeat
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.length_inverse import LengthInverse, Outcome, PHASE_PASSES
 from hysteresis_ros.model.pacing import Pacing
-from hysteresis_ros.model.second_stage import SecondStage
 from hysteresis_ros.model.targets import Targets
 
 if TYPE_CHECKING:
     from hysteresis_ros.model.muscle import MuscleModel
 
-# Passes that bring a clipped drive into agreement with the phase that it causes.
-PHASE_PASSES = 20
-# Share of martensite that makes no difference to the drive.
-SAME_SHARE = 1e-9
 # A reference that is missed by less than this share of the range is reached: the tables of the arm
 # are about as exact.
 REACHED = 1e-6
@@ -56,20 +52,6 @@ class Setpoint(NamedTuple):
     expected: float
     error: float
     reason: str
-
-
-class Outcome(NamedTuple):
-    """
-    What a drive would do.
-
-    `length` [m], `drive_squared`, what the muscles commit, and their share of martensite where an
-    effect needs it.
-    """
-
-    length: float
-    drive_squared: float
-    following: np.ndarray
-    phase: float
 
 
 class Controller:
@@ -115,7 +97,7 @@ class Controller:
     """
 
     # Only of a model with a length stage, and of one with an arm.
-    _second: SecondStage
+    _length: LengthInverse
     _targets: Targets
 
     def __init__(self, model: MuscleModel, voltage_limits: tuple[float, float] | None = None,
@@ -123,7 +105,8 @@ class Controller:
                  lag_margin: float = 0.3, rate_limit: float = math.inf,
                  angle_dead_band: float = 1e-3) -> None:
         self.model = model
-        self.limits = tuple(voltage_limits or model.ranges.get(model.drive, (0.0, math.inf)))
+        low, high = voltage_limits or model.ranges.get(model.drive, (0.0, math.inf))
+        self.limits = low, high
         if not self.limits[0] < self.limits[1]:
             raise ParameterError(f'the drive limits {self.limits} have to be a lower and an upper')
         if not 0.0 <= lag_margin < 1.0:
@@ -141,12 +124,12 @@ class Controller:
                              model.surroundings)
         self._first = model.first_stage(self._chain)
         self._force = copy.deepcopy(model.force_stage)
-        if model.length_stage is not None:
-            self._second = SecondStage(model.require_length_stage(self._chain), model.sign,
-                                       self._chain, self._first.loaded)
         self._pacing = Pacing(
             [self._chain, *_with_other_lags(model, self._chain, lag_margin)], self._clip,
             self._inputs, horizon, rate_limit, latent * model.surroundings.full_drive_squared)
+        if model.length_stage is not None:
+            self._length = LengthInverse(model, self._chain, self._steady, self._first,
+                                         self._pacing, self.limits, self._clip)
         if model.geometry is not None:
             self._targets = Targets(model.geometry, self._chain, lambda: self._at_rest()[0])
         self.rate_limit = rate_limit
@@ -199,7 +182,7 @@ class Controller:
         self._first.reset()
         self._cold = self._first.step(drive_squared)
         if self.model.length_stage is not None:
-            self._second.reset()
+            self._length.second.reset()
         if self._force is not None:
             self._force.reset()
             self._force.step(cold)
@@ -213,7 +196,8 @@ class Controller:
     def save(self) -> dict[str, Any]:
         """Return the memory as plain types, fit for JSON and YAML."""
         return {'first': self._first.save(),
-                'second': self._second.save() if self.model.length_stage is not None else None,
+                'second': (self._length.second.save() if self.model.length_stage is not None
+                           else None),
                 'force': self._force.save() if self._force is not None else None,
                 'effects': [self._chain.save(), self._steady.save()],
                 'targets': self._targets.save() if self.model.geometry is not None else {},
@@ -244,7 +228,7 @@ class Controller:
     def _take(self, state: Mapping[str, Any]) -> None:
         self._first.restore(state['first'])
         if self.model.length_stage is not None:
-            self._second.restore(state['second'])
+            self._length.second.restore(state['second'])
         if self._force is not None:
             self._force.restore(state['force'])
         for chain, entry in zip((self._chain, self._steady), state['effects'], strict=True):
@@ -384,20 +368,11 @@ class Controller:
         self._pacing.advance(time)
         if self._fresh:
             # The cold muscle lengthens under its load before it is first driven.
-            self._second.settle_cold(self._cold, force, self._at_rest()[1] if self._arm else None)
-            self._pacing.rest(float(self.model.martensite(self._second.output)))
-        inputs = self._inputs(0.0, self._share(length, force), ambient, supply)
-        find = self._search if self._steady.drifts else self._invert
-        drive, saturated = find(length, force, inputs)
-        outcome = self._outcome(drive, force, inputs)
-        if self._steady.drifts and self._chain.needs_phase:
-            # Of a length to which time and use add, the transformation's share is not known before.
-            for _ in range(PHASE_PASSES):
-                if abs(outcome.phase - inputs.phase) <= SAME_SHARE:
-                    break
-                inputs = inputs._replace(phase=outcome.phase)
-                drive, saturated = find(length, force, inputs)
-                outcome = self._outcome(drive, force, inputs)
+            self._length.second.settle_cold(
+                self._cold, force, self._at_rest()[1] if self._arm else None)
+            self._pacing.rest(float(self.model.martensite(self._length.second.output)))
+        drive, saturated, outcome, inputs = self._length.find(length, force, self._inputs(
+            0.0, self._length.share(length, force), ambient, supply), self.dead_band)
         if saturated:
             outcome, inputs = self._at_limit(drive, force, inputs)
         # At the ends of the drive a plateau, or rounding, may give just what was asked for.
@@ -416,73 +391,16 @@ class Controller:
         for _ in range(PHASE_PASSES if self._chain.needs_phase else 1):
             if self._arm and self.model.geometry is not None:
                 stopped = self._targets.stopped(
-                    lambda tension: self._outcome(drive, tension, inputs).length)
+                    lambda tension: self._length.outcome(drive, tension, inputs).length)
                 force = force if stopped is None else stopped.force
             if self._chain.needs_phase:
-                inputs = inputs._replace(phase=self._outcome(drive, force, inputs).phase)
-        return self._outcome(drive, force, inputs), inputs
-
-    def _transformed(self, length: float, force: float) -> float:
-        """Return what the transformation has to give for a length [m] under a force [N]."""
-        base = self._second.base
-        scale = float(self._chain.scale(np.float64(force)))
-        return base + (length - base - float(self._chain.stretch(np.float64(force)))) / scale
-
-    def _share(self, length: float, force: float) -> float:
-        """Return the share of martensite at a length [m] under a force [N]."""
-        return float(self.model.martensite(
-            self._second.given(self._transformed(length, force), force)))
-
-    def _invert(self, length: float, force: float, inputs: Inputs) -> tuple[float, bool]:
-        """Drive in closed form, and whether it is out of reach."""
-        x, out_of_reach = self._second.drive(
-            self._transformed(length, force), force, self.dead_band)
-        drive_squared, saturated = self._first.invert(x)
-        drive, clipped = self._clip(self._steady.inverse(drive_squared, inputs))
-        return drive, out_of_reach or saturated or clipped
-
-    def _search(self, length: float, force: float, inputs: Inputs) -> tuple[float, bool]:
-        """Drive by a search: the offset of time and use depends on the drive that is sought."""
-        low, high = self.limits
-        if not math.isfinite(high):
-            high = float(self._chain.to_drive(self._chain.surroundings.full_drive_squared))
-
-        def error(drive: float) -> float:
-            return self.model.sign * (
-                self._outcome(drive, force, inputs).length - length)
-
-        here = self._pacing.drive
-        if low <= here <= high and abs(error(here)) <= self.dead_band:
-            return here, False
-        margin = 1e-9 * self._chain.surroundings.span
-        at_low, at_high = error(low), error(high)
-        if at_low >= 0.0:
-            return low, at_low > margin
-        if at_high <= 0.0:
-            return high, at_high < -margin
-        from scipy.optimize import brentq   # half a second that most models do not need
-        return brentq(error, low, high, xtol=1e-14, rtol=1e-14), False
-
-    def _outcome(self, drive: float, force: float, inputs: Inputs) -> Outcome:
-        """Say what a drive would do; commits nothing."""
-        drive_squared = self._steady.step(drive, inputs)
-        output, committed = self._second.respond(self._first.peek(drive_squared), force)
-        offset, factor = 0.0, 1.0
-        if self._steady.drifts:
-            before = self._steady.save()
-            offset, factor = self._steady.advance(drive, drive_squared, self._worn(inputs, drive))
-            self._steady.restore(before)
-        base, felt = self._second.base, np.float64(force)
-        length = (base + float(self._chain.scale(felt)) * factor * (output - base)
-                  + float(self._chain.stretch(felt)) + offset)
-        phase = (float(self.model.martensite(self._second.given(output, force)))
-                 if self._chain.needs_phase else math.nan)
-        return Outcome(length, drive_squared, committed, phase)
+                inputs = inputs._replace(phase=self._length.outcome(drive, force, inputs).phase)
+        return self._length.outcome(drive, force, inputs), inputs
 
     def _commit(self, drive: float, outcome: Outcome, inputs: Inputs, time: float | None) -> float:
         self._first.step(outcome.drive_squared)
-        self._second.step(outcome.following)
-        self._steady.advance(drive, outcome.drive_squared, self._worn(inputs, drive))
+        self._length.second.step(outcome.following)
+        self._steady.advance(drive, outcome.drive_squared, self._length.worn(inputs, drive))
         self._fresh = False
         if math.isfinite(inputs.ambient):
             self._ambient = inputs.ambient
@@ -530,11 +448,6 @@ class Controller:
         if not math.isfinite(supply) and self._supply is not None:
             supply = self._supply
         return Inputs(0.0, 0.0, dt, ambient, phase, 0.0, supply)
-
-    def _worn(self, inputs: Inputs, drive: float) -> Inputs:
-        """Return the inputs with the cycles that there will be after `drive`."""
-        travel = self._pacing.travel + abs(drive - self._pacing.drive)
-        return inputs._replace(cycles=travel / (2.0 * self.model.drive_range))
 
     def _no_number(self) -> Setpoint:
         return Setpoint(self._clip(self._pacing.drive)[0], True, math.nan, math.nan,
