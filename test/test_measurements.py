@@ -7,6 +7,7 @@ import re
 from hypothesis import given, settings, strategies
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement, settled_rows
+from hysteresis_ros.measurements.holds import not_held_since
 from hysteresis_ros.measurements.holds import holds
 from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.measurements.units import UNITS
@@ -186,7 +187,19 @@ def test_a_short_hold_off_the_way_means_that_the_run_is_not_settled(rows, level)
     """Beyond the hold before or after it, or where no hold comes after it."""
     columns = staircase([1, 3, 2], 30.0)
     columns['voltage'][rows] = level
-    assert settled_rows(Measurement.from_columns(columns)) is None
+    table = Measurement.from_columns(columns)
+    assert settled_rows(table) is None
+    # The hold before ends where the drive leaves it.
+    since = 0.1 * (rows.start if rows.start >= 200 else 0)
+    assert not_held_since(table) == (0.0, pytest.approx(since))
+
+
+def test_it_is_said_in_which_trial_the_drive_is_not_held():
+    held, moving = staircase([1, 3], 30.0), staircase([1, 3, 2, 4, 1, 2], 10.0)
+    moving['trial'] = moving['trial'] + 7.0
+    table = Measurement.from_columns({
+        name: np.concatenate((held[name], moving[name])) for name in held})
+    assert settled_rows(table) is None and not_held_since(table) == (7.0, 0.0)
 
 
 def test_a_settled_table_stays_as_it_is():

@@ -10,7 +10,7 @@ from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements.bag import is_bag, read_bag
 from hysteresis_ros.measurements.columns import Mapped, parse_columns
 from hysteresis_ros.measurements.csv import read_csv, read_reference, write_csv
-from hysteresis_ros.measurements.holds import settled_rows
+from hysteresis_ros.measurements.holds import not_held_since, settled_rows
 from hysteresis_ros.measurements.quantities import QUANTITIES, Quantity
 from hysteresis_ros.measurements.table import Measurement, MeasurementWarning, SETTLED_HOLD
 
@@ -57,7 +57,8 @@ def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
     found = read_bag(path, namespace) if is_bag(path) else read_csv(path, mapping)
     reduced = settled_rows(found) if settled else found
     if reduced is None:
+        trial, time = not_held_since(found)
         raise MeasurementError(f'{path}: the drive is not held for {SETTLED_HOLD:.0f} s at a time, '
-                               'so there are no settled states; take the whole run, without '
-                               '"settled"')
+                               f'first from {time:.1f} s of trial {trial:g} on, so there are no '
+                               'settled states; take the whole run, without "settled"')
     return reduced

@@ -70,26 +70,56 @@ def hold_ends(measurement: Measurement, hold: float = SETTLED_HOLD,
         not one that goes beyond.
 
     """
+    windows, elsewhere = _windows(measurement, hold, average)
+    return np.array(windows) if windows and elsewhere is None else None
+
+
+def not_held_since(measurement: Measurement, hold: float = SETTLED_HOLD) -> tuple[float, float]:
+    """
+    Return where the drive first goes its way without a hold, for a message.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        A run of which `hold_ends` finds none.
+    hold : float
+        As for `settled_rows`.
+
+    Returns
+    -------
+    trial : float
+        Number of the trial.
+    time : float
+        In that trial [s].
+    """
+    trial, row = _windows(measurement, hold, 0.0)[1] or next(
+        (trial, rows.start) for trial, rows in measurement.split())
+    return trial, float(measurement.column('time')[row])
+
+
+def _windows(measurement: Measurement, hold: float, average: float
+             ) -> tuple[list[tuple[int, int]], tuple[float, int] | None]:
+    """Return what `hold_ends` does, and trial and row from which holds are too short, or None."""
     time, drive = measurement.column('time'), measurement.column(measurement.drive)
     band = TOLERANCE * float(np.ptp(drive))
-    found = []
-    for _, rows in measurement.split():
-        last, lowest, highest = drive[rows.start], np.inf, -np.inf
+    found: list[tuple[int, int]] = []
+    for trial, rows in measurement.split():
+        last, lowest, highest, left = drive[rows.start], np.inf, -np.inf, rows.start
         for low, high in holds(drive, rows):
             end = time[high] if high < rows.stop else time[high - 1]
             if end - time[low] >= hold * (1 - 1e-3):
                 if (lowest < min(last, drive[low]) - band
                         or highest > max(last, drive[low]) + band):
-                    return None
+                    return found, (trial, left)
                 begin = np.searchsorted(time[low:high], time[high - 1] - average, side='left')
                 found.append((low + int(begin), high))
-                last, lowest, highest = drive[low], np.inf, -np.inf
+                last, lowest, highest, left = drive[low], np.inf, -np.inf, high
             elif low > rows.start and high < rows.stop:
                 lowest = min(lowest, float(np.min(drive[low:high])))
                 highest = max(highest, float(np.max(drive[low:high])))
         if np.isfinite(lowest):
-            return None
-    return np.array(found) if found else None
+            return found, (trial, left)
+    return found, None
 
 
 def mean_of_windows(values: np.ndarray, windows: np.ndarray) -> np.ndarray:
