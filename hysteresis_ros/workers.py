@@ -8,15 +8,20 @@ its threads wait for each other most of the time.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 import contextlib
+import fcntl
+import math
 import multiprocessing
 from multiprocessing.connection import Connection
 import os
+from pathlib import Path
 import signal
 import sys
+import termios
 import threading
 import time
-from typing import Any
+from typing import Any, NoReturn, TypeVar
 import warnings
 
 try:
@@ -27,18 +32,24 @@ except ImportError:     # rosdep has no key for it: BLAS keeps its threads, whic
 # Time between two looks at whether the process that gave the work still lives [s].
 LOOK_PERIOD = 1.0
 
+Item = TypeVar('Item')
+Result = TypeVar('Result')
 # A progress bar: given the items of a long computation and their number, it returns the items.
 Progress = Callable[[Iterable, int], Iterable]
 
-# What forks take their items from holds so many at most, of four bytes each, in a pipe of 64 kB.
-MOST_TICKETS = 8192
+# What forks take their items from holds so many at most, of four bytes each: the smallest pipe that
+# Linux gives is a page.
+MOST_TICKETS = 1000
+# Where a control group says how many cores its processes may use, on average.
+QUOTA = '/sys/fs/cgroup/cpu.max'
+# Threads of BLAS, which Python 3.12 warns of where it is forked, are taken care of by BLAS.
+warnings.filterwarnings('ignore', '.*multi-threaded, use of fork', DeprecationWarning, __name__)
 
 _LOCK = threading.Lock()
 _limits: Any = None
 _holders: dict[int, int] = {}    # thread to how often it has entered
 _watching = False
-_dividing = False
-_killed: set[int] = set()
+_sharing = False
 
 
 @contextlib.contextmanager
@@ -88,33 +99,81 @@ def forks(jobs: int) -> int:
     -------
     int
         1 where this process must not be forked: beside other threads, such as those of a notebook,
-        whose locks a fork would hold for ever, and where work is shared already.
+        whose locks a fork would hold for ever, where work is shared already, and on systems whose
+        BLAS does not work in a fork.
     """
-    if _dividing or not hasattr(os, 'fork') or threading.active_count() > 1:
+    if _sharing or sys.platform != 'linux' or threading.active_count() > 1:
+        return 1
+    if threadpoolctl is None and 'libgomp' in Path('/proc/self/maps').read_text(encoding='utf-8'):
+        # Nothing would keep BLAS from its threads by OpenMP, of which a fork has none.
         return 1
     return threads(jobs)
 
 
 def threads(jobs: int) -> int:
-    """Return how many threads may be used: one where cores have work from `map_in_forks`."""
-    if _dividing:
+    """Return how many threads may be used: one where cores have work that is shared already."""
+    if _sharing:
         return 1
     return cores() if jobs < 0 else max(jobs, 1)
 
 
 def cores() -> int:
     """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else (
-        os.cpu_count() or 1)
+    if not hasattr(os, 'sched_getaffinity'):
+        return os.cpu_count() or 1
+    found = len(os.sched_getaffinity(0))
+    with contextlib.suppress(OSError, ValueError):
+        quota, period = Path(QUOTA).read_text(encoding='ascii').split()
+        found = min(found, math.ceil(int(quota) / int(period)))     # or 'max', which is no number
+    return max(found, 1)
 
 
-def map_in_forks(function: Callable[[Any], Any], items: Iterable, jobs: int) -> list:
+@contextlib.contextmanager
+def _shared() -> Iterator[None]:
+    """Let nothing in this process, or in a fork of it, share its work meanwhile."""
+    global _sharing
+    before, _sharing = _sharing, True
+    try:
+        yield
+    finally:
+        _sharing = before
+
+
+def map_in_threads(function: Callable[[Item], Result], items: Iterable[Item], jobs: int
+                   ) -> list[Result]:
+    """
+    Return what a function gives for each of some items, in their order, from threads.
+
+    It pays where most of its time passes in compiled kernels, which do not hold the interpreter.
+
+    Parameters
+    ----------
+    function : callable
+        Of one item. What it changes, it changes for the others, too.
+    items : iterable
+    jobs : int
+        Threads; see `threads`.
+    """
+    def alone(item: Item) -> Result:
+        with one_blas_thread():
+            return function(item)
+
+    items, count = list(items), threads(jobs)
+    if min(count, len(items)) < 2:
+        return [function(item) for item in items]
+    with _shared(), ThreadPoolExecutor(count) as pool:
+        return list(pool.map(alone, items))
+
+
+def map_in_forks(function: Callable[[Item], Result], items: Iterable[Item], jobs: int,
+                 ended: Callable[[], Any] = lambda: None) -> list[Result]:
     """
     Return what a function gives for each of some items, in their order.
 
     Forks of this process do a part of them. They know all that it knows, and what they learn is
-    forgotten but for the results; so the function must not change anything that counts. What a fork
-    cannot do, or its result not be sent, is done here.
+    forgotten but for the results; so what the function gives must not depend on what else it has
+    done before. What a fork cannot do, or its result not be sent, is done here, which raises its
+    error if it has one. Warnings of forks go to standard error.
 
     Parameters
     ----------
@@ -123,62 +182,126 @@ def map_in_forks(function: Callable[[Any], Any], items: Iterable, jobs: int) -> 
     items : iterable
     jobs : int
         Processes, this one among them; see `forks`.
+    ended : callable
+        Is called here once for each item, when it has ended.
     """
-    global _dividing
     items = list(items)
     count = min(forks(jobs), len(items))
-    if count < 2:
-        return [function(item) for item in items]
-    size = -(-len(items) // MOST_TICKETS)
+    results: dict[int, Result] = {}
+    if count > 1:
+        with _shared(), one_blas_thread(), contextlib.ExitStack() as stack:
+            tickets = _tickets(len(items))
+            stack.callback(os.close, tickets)
+            size = -(-len(items) // MOST_TICKETS)
+            children: list[_Fork] = []
+            stack.callback(_end, children)
+            with contextlib.suppress(OSError):      # too many processes or files
+                while len(children) < count - 1 and _left(tickets):
+                    _Fork(function, items, tickets, size, children)
+            with contextlib.suppress(Exception):    # it is raised below, if none of before is
+                for index in _taken(tickets, size, len(items)):
+                    results[index] = function(items[index])
+                    ended()
+            for _ in _taken(tickets, size, len(items)):
+                pass
+            for child in children:
+                for index, result in child.results():
+                    results[index] = result
+                    ended()
+    found = []
+    for index, item in enumerate(items):
+        if index not in results:
+            results[index] = function(item)
+            ended()
+        found.append(results[index])
+    return found
+
+
+def _tickets(count: int) -> int:
+    """Return a pipe from which indices below a count can be taken, a few at a time."""
     tickets, ticket = os.pipe()
-    for begin in range(0, len(items), size):
-        os.write(ticket, begin.to_bytes(4, 'little'))
-    os.close(ticket)
-    children: list[tuple[int, Connection]] = []
-    results: dict[int, Any] = {}
-    _dividing = True
     try:
-        with one_blas_thread():
-            for _ in range(count - 1):
-                children.append(_fork(function, items, _taken(tickets, len(items), size)))
-            for index in _taken(tickets, len(items), size):
-                results[index] = function(items[index])
-            for _, answers in children:
-                results.update(_sent(answers))
-            return [results[index] if index in results else function(item)
-                    for index, item in enumerate(items)]
+        for begin in range(0, count, -(-count // MOST_TICKETS)):
+            os.write(ticket, begin.to_bytes(4, 'little'))
     finally:
-        _dividing = False
-        os.close(tickets)
-        for process, answers in children:
-            answers.close()
-            os.kill(process, signal.SIGKILL)
-            _killed.add(process)
-        _bury()
+        os.close(ticket)
+    return tickets
 
 
-def _bury() -> None:
-    """Let go of forks that have ended; how long that takes, nobody has to wait for."""
-    for process in tuple(_killed):
-        with contextlib.suppress(ChildProcessError):
-            if not os.waitpid(process, os.WNOHANG)[0]:
+def _left(tickets: int) -> bool:
+    """Return whether any indices can still be taken."""
+    return fcntl.ioctl(tickets, termios.FIONREAD, bytes(4)) != bytes(4)
+
+
+def _taken(tickets: int, size: int, count: int) -> Iterator[int]:
+    """Take indices below a count, which nobody else gets, while there are any."""
+    while ticket := os.read(tickets, 4):
+        begin = int.from_bytes(ticket, 'little')
+        yield from range(begin, min(begin + size, count))
+
+
+class _Fork:
+    """
+    A fork of this process that does a part of some items.
+
+    Parameters
+    ----------
+    function, items
+        As of `map_in_forks`.
+    tickets, size : int
+        Pipe of the items that are still to do, and how many each stands for.
+    siblings : list of _Fork
+        It is added to.
+    """
+
+    def __init__(self, function: Callable[[Any], Any], items: Sequence, tickets: int, size: int,
+                 siblings: list['_Fork']) -> None:
+        parent, self._sent_all = os.getpid(), False
+        self._answers, answer = multiprocessing.Pipe(duplex=False)
+        # A signal in between would run the caller's own handlers twice, or leave a fork behind.
+        signals = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+        try:
+            self._process = os.fork()
+            if not self._process:
+                _do(function, items, _taken(tickets, size, len(items)), answer, parent, signals)
+            siblings.append(self)
+        finally:
+            answer.close()
+            signal.pthread_sigmask(signal.SIG_SETMASK, signals)
+
+    def results(self) -> Iterator[tuple[int, Any]]:
+        """Receive its results when it has done all of them."""
+        while True:
+            try:
+                yield self._answers.recv()
+            except (EOFError, OSError):
+                self._sent_all = True
+                return
+            except Exception:       # cannot be read, and is done again
                 continue
-        _killed.discard(process)
+
+    def end(self) -> None:
+        """End it, whatever it does; one that has sent all ends by itself."""
+        self._answers.close()
+        with contextlib.suppress(ChildProcessError, ProcessLookupError):
+            if not self._sent_all:
+                os.kill(self._process, signal.SIGKILL)
+            os.waitpid(self._process, 0)
 
 
-def _fork(function: Callable[[Any], Any], items: Sequence, taken: Iterable[int]
-          ) -> tuple[int, Connection]:
-    """Return a fork that takes its part of the items, and where it sends its results."""
-    parent = os.getpid()
-    answers, answer = multiprocessing.Pipe(duplex=False)
-    with warnings.catch_warnings():
-        # Threads of BLAS, which Python warns of, are taken care of by BLAS.
-        warnings.simplefilter('ignore', DeprecationWarning)
-        process = os.fork()
-    if process:
-        answer.close()
-        return process, answers
+def _end(children: Iterable[_Fork]) -> None:
+    for child in children:
+        child.end()
+
+
+def _do(function: Callable[[Any], Any], items: Sequence, taken: Iterable[int],
+        answer: Connection, parent: int, signals: Iterable[int]) -> NoReturn:
+    """Do a part of some items in a fork, send the results, and end."""
     try:
+        # Ctrl-C and what the caller does at a signal are its parent's, which ends it.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_SETMASK, signals)
         end_with(parent)
         # They are sent in the end: till then nobody reads them, and little fits into a pipe.
         found = []
@@ -189,23 +312,7 @@ def _fork(function: Callable[[Any], Any], items: Sequence, taken: Iterable[int]
             with contextlib.suppress(Exception):
                 answer.send(one)
     finally:
-        os._exit(0)     # whatever happened, the parent's own work is not done twice
-
-
-def _taken(tickets: int, count: int, size: int) -> Iterator[int]:
-    """Take indices below a count, a few at a time, which nobody else gets, while there are any."""
-    while ticket := os.read(tickets, 4):
-        begin = int.from_bytes(ticket, 'little')
-        yield from range(begin, min(begin + size, count))
-
-
-def _sent(answers: Connection) -> Iterator[tuple[int, Any]]:
-    """Receive the results of a fork, as far as they go."""
-    while True:
-        try:
-            yield answers.recv()
-        except Exception:       # the end, or what cannot be read and is done again
-            return
+        os._exit(0)     # whatever happened, what the parent does besides is not done twice
 
 
 def delayed(function: Callable) -> Callable:
@@ -213,8 +320,17 @@ def delayed(function: Callable) -> Callable:
     return lambda *args, **kwargs: (function, args, kwargs)
 
 
-def chosen_backend() -> bool:
-    """Return whether another joblib backend than processes of this machine is in force."""
+def must_be_sent(jobs: int) -> bool:
+    """
+    Return whether work has to be shared by `in_parallel`, and not by `map_in_forks`.
+
+    Where another joblib backend than processes of this machine is in force, such as dask; and
+    where several jobs are wanted, but no forks are possible.
+    """
+    return _other_backend() or (threads(jobs) > 1 and forks(jobs) < 2)
+
+
+def _other_backend() -> bool:
     if 'joblib' not in sys.modules:
         return False
     from joblib.parallel import get_active_backend

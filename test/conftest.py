@@ -8,6 +8,7 @@ from pathlib import Path
 import subprocess
 import sys
 import tempfile
+import threading
 
 import hypothesis
 import pytest
@@ -117,3 +118,16 @@ def colcon(workspace, *arguments):
         capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+@pytest.fixture
+def forkable():
+    """End the threads that look after workers: beside them no process is forked."""
+    if 'joblib' in sys.modules:
+        from joblib.externals.loky import reusable_executor
+        reusable_executor.get_reusable_executor().shutdown(wait=True)
+    others = [thread.name for thread in threading.enumerate()
+              if thread is not threading.main_thread()]
+    assert not others, f'threads of other tests are left: {others}'
+    if sys.platform != 'linux':
+        pytest.skip('processes are forked on Linux only')

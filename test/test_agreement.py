@@ -81,3 +81,17 @@ def test_a_fit_is_near_the_arm_that_is_followed_row_by_row(latent, time_constant
     own = effects('latent_heat', latent=latent, time_constant=time_constant)
     fitted, exact = (Simulator(MODEL, run).run(own, exact=exact) for exact in (False, True))
     assert np.sqrt(np.mean((fitted - exact) ** 2)) < math.radians(0.5)
+
+
+def test_a_copy_of_known_phases_knows_nothing_of_what_comes_later():
+    model = bicep_model()
+    one, other = effect_of(model, 'resistance_change'), effect_of(model, 'latent_heat')
+    known = KnownPhases(3)
+    known.keep([one], np.array([0.1, 0.2, 0.3]))
+    before = known.copy()
+    known.keep([one, other], np.array([0.4, 0.5, 0.6]))
+    np.testing.assert_array_equal(known.nearest([one, other]), [0.4, 0.5, 0.6])
+    np.testing.assert_array_equal(before.nearest([one, other]), [0.1, 0.2, 0.3])
+    before.keep([other], np.array([0.7, 0.8, 0.9]))
+    np.testing.assert_array_equal(before.nearest([other]), [0.7, 0.8, 0.9])
+    np.testing.assert_array_equal(known.nearest([one]), [0.1, 0.2, 0.3])

@@ -91,3 +91,37 @@ def test_fits_are_judged_anew_with_each_covariance_that_is_added(fitter, sets):
 def test_the_subsets_of_a_set_lack_one_effect_each():
     assert set(subsets(frozenset('abc'))) == {frozenset('ab'), frozenset('ac'), frozenset('bc')}
     assert subsets(frozenset()) == []
+
+
+@pytest.mark.parametrize('jobs', [1, 2])
+def test_all_are_judged_as_each_by_itself(fitter, sets, monkeypatch, jobs, forkable):
+    """Under covariances that came later, along a way of their own or not."""
+    monkeypatch.setattr(fitter.problem, 'jobs', jobs)
+    fit = fitted(fitter)
+    sets.fits = {frozenset(['one']): fit, frozenset(['two']): fitter.along(fit)}
+    before = dict(sets.fits)
+    monkeypatch.setattr(fitter.covariance, 'points', [*fitter.covariance.points])
+    fitter.covariance.add(fitter.covariance.start(0.05, 0.02))
+    sets.judge_all()
+    for names, found in sets.fits.items():
+        alone = fitter.judge(before[names])
+        assert (found.log_evidence, found.judged) == (alone.log_evidence, alone.judged)
+        assert np.array_equal(found.values, alone.values)
+        assert np.array_equal(found.spread, alone.spread)
+        assert found.predicted is before[names].predicted
+        assert found.covariance is before[names].covariance
+
+
+def test_noise_is_judged_by_the_same_draws_whatever_else_was_judged(fitter):
+    p_values = []
+    for others in (0, 2):
+        sets = FittedSets(fitter, Settings(), np.random.default_rng(0))
+        rng = np.random.default_rng(5)
+        for names in [frozenset([str(other)]) for other in range(others)] + [NAMES]:
+            fit = fitted(fitter)
+            noise = rng.standard_normal(len(fit.predicted)) if names != NAMES else 0.1 * np.sin(
+                np.arange(len(fit.predicted)))
+            sets.fits[names] = dataclasses.replace(fit, predicted=fit.predicted + noise)
+            found = sets._noise_p_value(names)
+        p_values.append(found)
+    assert p_values[0] == p_values[1]

@@ -11,6 +11,7 @@ Methods for non-linear least squares problems, 2004, sec. 3.5). Sets are shared 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+import contextlib
 import dataclasses
 import math
 from typing import Any, TYPE_CHECKING, TypeAlias
@@ -20,8 +21,9 @@ import numpy as np
 from hysteresis_ros.diagnosis.covariance import Covariance, noise_of, Point
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector
-from hysteresis_ros.effects import Effect
-from hysteresis_ros.workers import map_in_forks
+from hysteresis_ros.effects import Effect, needs_phase
+from hysteresis_ros.model.simulation import WORTH_THREADS
+from hysteresis_ros.workers import forks, map_in_forks, map_in_threads
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -237,7 +239,7 @@ class Fitter:
         -------
         list of Fit
         """
-        fits = self.in_forks(lambda effects: self.fit_one(effects, point, steps, exact), sets)
+        fits = self.shared(lambda effects: self.fit_one(effects, point, steps, exact), sets)
         return [fit for fit in fits if fit is not None]
 
     def fit_one(self, effects: Sequence[Effect], point: Point, steps: int = MOST_STEPS,
@@ -269,10 +271,10 @@ class Fitter:
         return self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
                               walk.predicted, walk.jacobian, duration=self.problem.duration))
 
-    def in_forks(self, fit: Callable[[Sequence[Effect]], Fit | None],
-                 sets: Sequence[Sequence[Effect]]) -> list[Fit | None]:
+    def shared(self, fit: Callable[[Sequence[Effect]], Fit | None],
+               sets: Sequence[Sequence[Effect]]) -> list[Fit | None]:
         """
-        Return what `fit` makes of each set of effects, shared with forks where that can be.
+        Return what `fit` makes of each set of effects, shared with forks, or else with threads.
 
         Each begins with the phases known before all of them, whoever comes first.
 
@@ -286,22 +288,34 @@ class Fitter:
         -------
         list of Fit or None
         """
+        problem = self.problem
+
         def answer(effects: Sequence[Effect]) -> Answer | None:
-            with self.problem.no_phases_kept():
+            with (problem.no_phases_kept() if needs_phase(self._all(effects))
+                  else contextlib.nullcontext()):
                 found = fit(effects)
                 if found is None:
                     return None
-                phases = self.problem.phases(self._all(found.effects))
+                phases = problem.phases(self._all(found.effects))
             if found.covariance is None:
                 return found, None, phases
             # A covariance is large, and all but its discrepancy is known here.
             return dataclasses.replace(found, covariance=None), found.covariance.discrepancy, phases
 
+        if forks(problem.jobs) < 2 and problem.rows >= WORTH_THREADS:
+            # Threads have one memory of phases.
+            alone = [not needs_phase(self._all(effects)) for effects in sets]
+            known = iter(map_in_threads(
+                answer, [effects for effects, one in zip(sets, alone) if one], problem.jobs))
+            answers = [next(known) if one else answer(effects)
+                       for effects, one in zip(sets, alone)]
+        else:
+            answers = map_in_forks(answer, sets, problem.jobs)
         fits: list[Fit | None] = []
-        for one in map_in_forks(answer, sets, self.problem.jobs):
+        for one in answers:
             found, discrepancy, phases = one or (None, None, [])
             if found is not None:
-                self.problem.keep_phases(self._all(found.effects), phases)
+                problem.keep_phases(self._all(found.effects), phases)
                 if discrepancy is not None:
                     found = dataclasses.replace(found, covariance=self.covariance.of(discrepancy))
             fits.append(found)
@@ -362,10 +376,11 @@ class Fitter:
         values = [point.values for point in self.covariance.points]
         if first > 0:
             return covariance.points_at(values[first:])
-        if self._judged[0] is not covariance:
-            self._judged = covariance, []
-        known = self._judged[1]
-        known += covariance.points_at(values[len(known):])
+        owner, points = self._judged
+        known = points if owner is covariance else []
+        known = [*known, *covariance.points_at(values[len(known):])]
+        # Threads may judge other fits meanwhile.
+        self._judged = covariance, known
         return known
 
     def point(self, fit: Fit) -> Point:

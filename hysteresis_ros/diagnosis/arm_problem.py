@@ -18,7 +18,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.diagnosis.discrepancy import Offset
-from hysteresis_ros.effects import Effect
+from hysteresis_ros.effects import Effect, needs_phase
 from hysteresis_ros.identification.operators import preisach_rows
 from hysteresis_ros.model.simulation import Simulator, WORTH_THREADS
 from hysteresis_ros.operators import Preisach
@@ -33,11 +33,6 @@ if TYPE_CHECKING:
 WORTH_FORKS = 50_000
 # Responses that are kept: a fit often begins where another one was.
 MOST_KEPT = 4000
-
-
-def needs_phase(effects: Sequence[Effect]) -> bool:
-    """Whether a simulation begins with the phase of a similar one before, so that order counts."""
-    return any(effect.needs_phase for effect in effects)
 
 
 class ArmProblem(Problem):
@@ -81,22 +76,23 @@ class ArmProblem(Problem):
         """
         keys = [tuple((effect.id, *effect.values.values()) for effect in effects)
                 for effects in sets]
-        new = [index for index, key in enumerate(keys) if key not in self._known]
-        found = dict(zip(new, self._simulate_new([sets[index] for index in new])))
-        responses = [found[index] if index in found else self._known[key]
-                     for index, key in enumerate(keys)]
+        # Another thread may empty what is known meanwhile.
+        responses = [self._known.get(key) for key in keys]
+        new = [index for index, response in enumerate(responses) if response is None]
+        found = self._simulate_new([sets[index] for index in new])
+        for index, response in zip(new, found):
+            responses[index] = response
         if len(self._known) > MOST_KEPT:
             self._known.clear()
-        for index in new:
+        for index, response in zip(new, found):
             # A phase is sought from that of the run before, so that these differ a little.
             if not needs_phase(sets[index]):
-                self._known[keys[index]] = found[index]
+                self._known[keys[index]] = response
         return np.array(responses).reshape(len(sets), len(self.measured))
 
     def _simulate_new(self, sets: Sequence[Sequence[Effect]]) -> np.ndarray:
         """Return the response (len(sets), n) of the judged rows for sets that are not known."""
-        rows = sum(measurement.rows for measurement in self.measurements)
-        if forks(self.jobs) < 2 or len(sets) * (rows + WORTH_THREADS) < WORTH_FORKS:
+        if forks(self.jobs) < 2 or len(sets) * (self.rows + WORTH_THREADS) < WORTH_FORKS:
             return self._run_many(sets)
         found = map_in_forks(self._apart, sets, self.jobs)
         for effects, (_, phases) in zip(sets, found):
@@ -126,7 +122,11 @@ class ArmProblem(Problem):
 
     @contextlib.contextmanager
     def no_phases_kept(self) -> Iterator[None]:
-        """Forget in the end the phases that runs have kept in the meantime."""
+        """
+        Forget in the end the phases that runs have kept in the meantime.
+
+        Those of replicates as well, which `keep_phases` does not know: they are few.
+        """
         simulators = [*self.simulators, *itertools.chain(*self._replicated)]
         known = [simulator.known_phases.copy() for simulator in simulators]
         try:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import copy
 import dataclasses
 from typing import TYPE_CHECKING
 
@@ -133,6 +134,12 @@ class BenchFitter:
     def __init__(self, problem: BenchProblem) -> None:
         self.problem = problem
         self.fixed = list(problem.model.effects)
+
+    def apart(self) -> BenchFitter:
+        """Return the same, from whose fits this one does not learn where to begin others."""
+        other = copy.copy(self)
+        other.problem = self.problem.apart()
+        return other
 
     def fit(self, effects: Sequence[Effect], evaluations: int = MOST_EVALUATIONS,
             tolerance: float = TOLERANCE) -> Fit:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from hysteresis_ros.diagnosis.problem import Problem
-from hysteresis_ros.effects import Effect, SensorEffect
+from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench import left_out
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
@@ -202,6 +202,14 @@ class BenchProblem(Problem):
         other._forget()
         return other
 
+    def apart(self) -> BenchProblem:
+        """Return the same, from whose work this one does not learn; what is known, it shares."""
+        other = copy.copy(self)
+        other._passive = dict(self._passive)
+        if self._holding_out is not None:
+            other._holding_out = self._holding_out.apart()
+        return other
+
     def holding_out(self) -> BenchProblem:
         """Return the same rows and grid, with weights regularised as for rows held out."""
         if self._holding_out is None:
@@ -233,7 +241,7 @@ class BenchProblem(Problem):
     def _design(self, effects: Sequence[Effect], levels: int | None = None,
                 train: np.ndarray | None = None, phases: list[np.ndarray] | None = None,
                 columns: np.ndarray | None = None) -> Design:
-        if phases is None and any(effect.needs_phase for effect in effects):
+        if phases is None and needs_phase(effects):
             phases = self._phases(effects, train)
         course = self._course(effects, phases)
         levels = levels or self.levels
@@ -346,7 +354,7 @@ class BenchProblem(Problem):
         if len(np.unique(groups)) == 1:
             groups = self.block[rows]
         phases, passes = None, 0
-        if any(effect.needs_phase for effect in effects):
+        if needs_phase(effects):
             phases, passes = self._phases(effects, train), PHASE_PASSES
         for remaining in range(passes, -1, -1):
             design = self._design(effects, levels, phases=phases)
@@ -381,7 +389,7 @@ class BenchProblem(Problem):
             Rows to fit; all by default.
         """
         phases = None
-        if any(effect.needs_phase for effect in effects):
+        if needs_phase(effects):
             phases = self._phases(effects, train)
         design = self._design(effects, phases=phases)
         weights = self._projected(design, train)

@@ -10,7 +10,6 @@ the answer, `bench_selection` says.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-import functools
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +20,7 @@ from hysteresis_ros.diagnosis.forms import other_forms
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.effects import catalogue, Effect
-from hysteresis_ros.workers import chosen_backend, delayed, map_in_forks, forks, in_parallel
+from hysteresis_ros.workers import delayed, in_parallel, map_in_forks, must_be_sent
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.bench_problem import BenchProblem
@@ -151,11 +150,15 @@ class BenchSearch:
     def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None], fitter: BenchFitter,
                      items: Sequence) -> list[Fit]:
         results: Iterable[Fit | None]
-        if chosen_backend() or self._jobs != 1 and forks(self._jobs) < 2:
-            results = in_parallel([delayed(task)(fitter, item) for item in items], self._jobs)
+        if must_be_sent(self._jobs):
+            results = self._progress(
+                in_parallel([delayed(task)(fitter, item) for item in items], self._jobs),
+                len(items))
         else:
-            results = map_in_forks(functools.partial(task, fitter), items, self._jobs)
-        results = self._progress(results, len(items))
+            bar = iter(self._progress(range(len(items)), len(items)))
+            next(bar, None)
+            results = map_in_forks(lambda item: task(fitter.apart(), item), items, self._jobs,
+                                   lambda: next(bar, None))
         return [fit for fit in results if fit is not None]
 
 

@@ -61,10 +61,14 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
         return None
     free = _free(effect, fitter.problem.kind)
     name = free[0].name
-    other = BenchFitter(fitter.problem)
+
+    def fitter_at(value: float) -> BenchFitter:
+        other = fitter.apart()
+        other.fixed = [*fitter.fixed, effect.with_values(**{name: value})]
+        return other
 
     def error_at(value: float) -> float:
-        other.fixed = [*fitter.fixed, effect.with_values(**{name: value})]
+        other = fitter_at(value)
         return other.error(other.cross_validate(other.fit(known)).held_out)
 
     values = np.geomspace(free[0].low, free[0].high, VALUES)
@@ -82,7 +86,7 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
     below = np.cumsum(np.exp(density - density.max()))
     low, high = np.exp(np.interp([0.025, 0.975], below / below[-1], fine))
     value = float(np.exp(fine[np.argmax(density)]))
-    other.fixed = [*fitter.fixed, effect.with_values(**{name: value})]
+    other = fitter_at(value)
     fit = other.fit(known)
     found = effect.with_values(**{name: value})
     found.intervals[name] = float(low), float(high)

@@ -50,6 +50,8 @@ class Problem:
 
     Attributes
     ----------
+    rows : int
+        Of all measurements, judged or not.
     measured : ndarray, shape (n,)
         The response in the rows that are judged: an angle [rad], a length [m] or a strain.
     noise : float
@@ -76,8 +78,8 @@ class Problem:
         self.kind = measurements[0].kind
         self.response = measurements[0].response
         self.settled = all(m.settled for m in measurements)
-        rows = sum(len(judged_rows(m)) for m in measurements)
-        self.stride = max(1, rows // MOST_ROWS)
+        self.rows = sum(m.rows for m in measurements)
+        self.stride = max(1, sum(len(judged_rows(m)) for m in measurements) // MOST_ROWS)
         self.chosen = [judged_rows(m)[::self.stride] for m in measurements]
         # What the model has acts before the onset of what is tried.
         self.simulators = [Simulator(model, *pair, model.effects)

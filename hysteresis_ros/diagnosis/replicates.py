@@ -47,10 +47,10 @@ def with_replicates(model: MuscleModel, problem: BenchProblem, by_hand: bool = F
     def replicate(left_out: np.ndarray) -> Replicate:
         effects = model.effects
         if not by_hand:
-            response = Response(finer, [], effects, ~left_out)
+            response = Response(finer.apart(), [], effects, ~left_out)
             effects = response.parameters.with_vector(response.minimise(
                 response.parameters.vector(), MOST_EVALUATIONS, TOLERANCE))
-        return Replicate(problem.stage(effects, levels, ~left_out), effects)
+        return Replicate(problem.apart().stage(effects, levels, ~left_out), effects)
 
     return dataclasses.replace(model, replicates=map_in_forks(
         replicate, folds_of(problem.left_out_together), problem.jobs))

@@ -321,7 +321,7 @@ class Selection:
 
     def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
-        for fit in self.fitter.in_forks(self._fitted, sets):
+        for fit in self.fitter.shared(self._fitted, sets):
             if fit is not None:
                 self.sets.keep(fit)
 

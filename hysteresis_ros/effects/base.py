@@ -13,7 +13,7 @@ a controller can undo it. Effects with dynamics or memory of their own carry it 
 """
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 import copy
 import dataclasses
 import math
@@ -313,3 +313,8 @@ class Effect(abc.ABC):
     def doubtful(cls, surroundings: Surroundings) -> bool:
         """Whether it is tried only where it is named; its user knows if the muscle can have it."""
         return False
+
+
+def needs_phase(effects: Iterable[Effect]) -> bool:
+    """Return whether one of some effects needs the martensite share."""
+    return any(effect.needs_phase for effect in effects)

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from hysteresis_ros.effects import (
-    DriveEffect, Effect, Inputs, MaterialEffect, MechanismEffect, SensorEffect, Surroundings,
-    catalogue)
+    DriveEffect, Effect, Inputs, MaterialEffect, MechanismEffect, needs_phase, SensorEffect,
+    Surroundings, catalogue)
 from hysteresis_ros.effects.base import STAGES, Values
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.thermal import LatentHeat
@@ -69,7 +69,7 @@ class Chain:
         self._shifting, self._playing = self._with('shift_load'), self._with('loop_width')
         self._scaling, self._stretching = self._with('scale'), self._with('stretch')
         self._elastic = self._with('elastic_share')
-        self.needs_phase = any(effect.needs_phase for effect in ordered)
+        self.needs_phase = needs_phase(ordered)
         # A fan changes gain and time constant together (d1 stands in both).
         for effect in self.thermal:
             effect.speed = math.prod(other.exchange for other in self.thermal)
