@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 import random
 
-from hysteresis_ros.laboratory.board.cable import Cable
+from hysteresis_ros.laboratory.board.serial_cable import SerialCable
 from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
 
 TROUBLES = ('unplug', 'silent', 'deaf', 'late', 'mad', 'frozen', 'supply_low', 'supply_off',
@@ -24,7 +24,7 @@ class WatchedArm:
 
     Parameters
     ----------
-    cable : Cable
+    cable : SerialCable
         Of a simulated port.
     watchdog : float
         Time in s of the arm for which it may be heated without a setpoint.
@@ -38,7 +38,8 @@ class WatchedArm:
         longer than the watchdog.
     """
 
-    def __init__(self, cable: Cable[SimulatedBoard], watchdog: float, rng: random.Random) -> None:
+    def __init__(self, cable: SerialCable[SimulatedBoard], watchdog: float, rng: random.Random
+                 ) -> None:
         self.faults = self.missed = 0
         self._cable = cable
         self._rng = rng

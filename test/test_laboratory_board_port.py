@@ -10,9 +10,9 @@ import math
 
 from hysteresis_ros.bridge.protocol import Decoder, encode, Frame
 from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.laboratory.board.cable import Cable
 from hysteresis_ros.laboratory.board.port import (
     CableUnplugged, LARGEST_BACKLOG, LARGEST_LAG, PortClosed, SimulatedPort)
+from hysteresis_ros.laboratory.board.serial_cable import SerialCable
 from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
 from hysteresis_ros.laboratory.board.url import check_url, make_plant, parse_url, Simulation
 from hysteresis_ros.laboratory.plant import Plant
@@ -42,7 +42,7 @@ def open_port(url, clock=time.monotonic):
 def cable(**options):
     simulation = parse_url('sim://bicep?' + '&'.join(
         f'{key}={value}' for key, value in options.items()))
-    return Cable(SimulatedBoard(Plant(0).arm, brownout=simulation.brownout), simulation)
+    return SerialCable(SimulatedBoard(Plant(0).arm, brownout=simulation.brownout), simulation)
 
 
 def frames(data):

@@ -14,8 +14,8 @@ import subprocess
 import sys
 import time
 
-from hysteresis_ros.laboratory.board.cable import Cable
 from hysteresis_ros.laboratory.board.chip import Chip
+from hysteresis_ros.laboratory.board.serial_cable import SerialCable
 from hysteresis_ros.laboratory.board.simulated_board import TICK
 from hysteresis_ros.laboratory.board.terminal import PortOnTerminal
 from tools.faults.run import BOARDS, LatePort, url_of
@@ -40,7 +40,7 @@ while True:
 """
 
 
-def _last_heated(cable: Cable, begun: float) -> float:
+def _last_heated(cable: SerialCable, begun: float) -> float:
     """Return when a board was last heated within a second; inf where it still is then."""
     last = begun
     while cable.time < begun + WATCHED:
@@ -51,7 +51,7 @@ def _last_heated(cable: Cable, begun: float) -> float:
 
 
 @contextlib.contextmanager
-def board_on_terminal(scheme: str, speed: float | None = None) -> Iterator[tuple[str, Cable]]:
+def board_on_terminal(scheme: str, speed: float | None = None) -> Iterator[tuple[str, SerialCable]]:
     """Give a board's terminal and its cable; ``sim`` or ``avr``."""
     url = url_of(scheme, speed=speed)
     if scheme == 'sim':

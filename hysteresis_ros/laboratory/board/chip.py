@@ -8,9 +8,9 @@ import collections
 import threading
 import time
 
-from hysteresis_ros.laboratory.board.cable import Cable
 from hysteresis_ros.laboratory.board.chip_board import ChipBoard
 from hysteresis_ros.laboratory.board.port import CableUnplugged
+from hysteresis_ros.laboratory.board.serial_cable import SerialCable
 from hysteresis_ros.laboratory.board.simavr import Simavr
 from hysteresis_ros.laboratory.board.simulated_board import TICK
 from hysteresis_ros.laboratory.board.terminal import Terminal
@@ -30,7 +30,7 @@ class Chip:
 
     Attributes
     ----------
-    cable : Cable
+    cable : SerialCable
         With board and arm at its far end.
     arm : Arm
         Of the virtual laboratory.
@@ -47,7 +47,7 @@ class Chip:
         arm = make_plant(simulation).arm
         self._chip = Simavr(url, simulation.speed)
         board = ChipBoard(self._chip, arm, simulation)
-        self.cable, self.arm = Cable(board, simulation), arm
+        self.cable, self.arm = SerialCable(board, simulation), arm
         self._others: collections.deque[bytes] = collections.deque()
         self._changing = threading.Lock()   # of the terminal, which goes with the cable
         self._terminal: Terminal | None = None

@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from hysteresis_ros.laboratory.board.cable import Cable
+from hysteresis_ros.laboratory.board.serial_cable import SerialCable
 from hysteresis_ros.laboratory.board.simulated_board import SimulatedBoard, TICK
 from hysteresis_ros.laboratory.board.url import make_plant, parse_url
 
@@ -46,7 +46,7 @@ class SimulatedPort:
 
     Attributes
     ----------
-    cable : Cable
+    cable : SerialCable
         With the board and the arm at its far end.
     is_open : bool
         Whether somebody has opened the port.
@@ -66,7 +66,7 @@ class SimulatedPort:
                                brownout=simulation.brownout, clock_back=simulation.clock_back,
                                encoder_jump=simulation.encoder_jump,
                                battery=lambda: arm.conditions.supply.share(arm.time))
-        self.cable = Cable(board, simulation)
+        self.cable = SerialCable(board, simulation)
         self.is_open = False
         self._clock = clock
         self._speed = simulation.speed

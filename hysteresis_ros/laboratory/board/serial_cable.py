@@ -50,7 +50,7 @@ class CabledBoard(Protocol):
 Board = TypeVar('Board', bound=CabledBoard)
 
 
-class Cable(Generic[Board]):
+class SerialCable(Generic[Board]):
     """
     The way between host and board, with its faults.
 
