@@ -10,7 +10,6 @@ its threads wait for each other most of the time.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import contextlib
-import fcntl
 import math
 import multiprocessing
 from multiprocessing.connection import Connection
@@ -18,7 +17,6 @@ import os
 from pathlib import Path
 import signal
 import sys
-import termios
 import threading
 import time
 from typing import Any, NoReturn, TypeVar
@@ -230,6 +228,8 @@ def _tickets(count: int) -> int:
 
 def _left(tickets: int) -> bool:
     """Return whether any indices can still be taken."""
+    import fcntl        # Windows has neither; nothing is forked there
+    import termios
     return fcntl.ioctl(tickets, termios.FIONREAD, bytes(4)) != bytes(4)
 
 

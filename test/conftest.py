@@ -123,11 +123,11 @@ def colcon(workspace, *arguments):
 @pytest.fixture
 def forkable():
     """End the threads that look after workers: beside them no process is forked."""
+    if sys.platform != 'linux':
+        pytest.skip('processes are forked on Linux only: the BLAS of others may not be')
     if 'joblib' in sys.modules:
         from joblib.externals.loky import reusable_executor
         reusable_executor.get_reusable_executor().shutdown(wait=True)
     others = [thread.name for thread in threading.enumerate()
               if thread is not threading.main_thread()]
     assert not others, f'threads of other tests are left: {others}'
-    if sys.platform != 'linux':
-        pytest.skip('processes are forked on Linux only')

@@ -24,22 +24,10 @@ from hysteresis_ros.workers import (
     cores, delayed, forks, in_parallel, map_in_forks, map_in_threads, MOST_TICKETS, must_be_sent,
     one_blas_thread, threads as threads_for)
 
-MAPPING = """
-import os, sys, time
-from hysteresis_ros.workers import map_in_forks
-
-def work(folder):
-    open(os.path.join(folder, str(os.getpid())), 'w').close()
-    end = time.monotonic() + 60.0
-    while time.monotonic() < end:
-        pass
-
-map_in_forks(work, [sys.argv[1]] * 4, 2)
-"""
 # Four each: their own time is a part of a second.
 WORKING = """
 import os, sys, time
-from hysteresis_ros.workers import delayed, in_parallel
+from hysteresis_ros.workers import delayed, in_parallel, map_in_forks
 
 def work(folder):
     open(os.path.join(folder, str(os.getpid())), 'w').close()
@@ -47,8 +35,9 @@ def work(folder):
     while time.monotonic() < end:
         pass
 
-list(in_parallel([delayed(work)(sys.argv[1])] * 4, 2))
 """
+WAYS = {'workers': 'list(in_parallel([delayed(work)(sys.argv[1])] * 4, 2))',
+        'forks': 'map_in_forks(work, [sys.argv[1]] * 4, 2)'}
 
 
 def threads():
@@ -163,6 +152,15 @@ def worked(item):
     """Return who does an item, so slowly that others take some, too."""
     time.sleep(0.02)
     return item, os.getpid()
+
+
+def test_a_system_without_forks_can_import_it(root):
+    """Windows has none of these modules."""
+    code = ("import sys; sys.modules['fcntl'] = sys.modules['termios'] = None; "
+            'from hysteresis_ros.workers import map_in_forks; print(map_in_forks(abs, [-1, 2], 1))')
+    done = subprocess.run([sys.executable, '-c', code], cwd=root, capture_output=True, text=True,
+                          check=True)
+    assert done.stdout == '[1, 2]\n'
 
 
 def test_forks_do_a_part_and_results_come_in_order(forkable):
@@ -370,11 +368,12 @@ def test_a_container_has_as_many_cores_as_it_may_use(monkeypatch, tmp_path, quot
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('program', [WORKING, MAPPING])
+@pytest.mark.parametrize('way', WAYS)
 @pytest.mark.skipif(not Path('/proc').is_dir(), reason='processes are looked up in /proc')
-def test_workers_end_when_their_parent_is_killed(root, tmp_path, program):
+def test_workers_end_when_their_parent_is_killed(root, tmp_path, way):
     """SIGKILL leaves no time to tell them, and a batch system uses it."""
-    parent = subprocess.Popen([sys.executable, '-c', program, str(tmp_path)], cwd=root)
+    parent = subprocess.Popen([sys.executable, '-c', WORKING + WAYS[way], str(tmp_path)],
+                              cwd=root)
     try:
         workers = set()
         deadline = time.monotonic() + 60.0
