@@ -65,6 +65,24 @@ def test_the_gradient_of_the_marginal_likelihood_is_that_of_differences():
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-3)
 
 
+def test_the_curvature_is_that_of_the_mean_density():
+    """Of residuals drawn from the covariance itself, so that it makes no step too long."""
+    covariance, rng = make(), np.random.default_rng(2)
+    values = np.array([0.2, np.log(0.015), np.log(100.0), np.log(0.008)])
+    matrix, factor = smooth(ROWS, 0.01).matrix(), covariance.point(values).factor
+    residuals = (factor @ rng.standard_normal((ROWS, 400))).T
+    found = np.mean([covariance._cost(values, one, matrix)[2] for one in residuals], axis=0)
+
+    def gradient(values):
+        return np.mean([covariance._cost(values, one, matrix)[1] for one in residuals], axis=0)
+
+    expected = [(gradient(values + step) - gradient(values - step)) / 2e-4
+                for step in 1e-4 * np.eye(4)]
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(found / np.outer(size, size), expected / np.outer(size, size),
+                               atol=0.15)
+
+
 def test_the_density_of_a_point_is_that_of_scipy():
     """With the prior of its values taken off."""
     covariance = make()
@@ -115,6 +133,37 @@ def test_drift_is_estimated_with_its_time(rho):
     times = [covariance.fit(autoregressive(rng, ROWS, rho, 0.05))[2] for _ in range(8)]
     expected = np.log(-30.0 / np.log(rho))
     assert np.median(times) == pytest.approx(expected, abs=0.7)
+
+
+@pytest.mark.parametrize('noise, rho', [(0.003, 0.0), (0.03, 0.0), (0.03, 0.9), (0.1, 0.98)])
+def test_no_other_values_are_much_more_probable(noise, rho):
+    """Of those that a general optimiser comes to, from the default starts and from one far away."""
+    covariance, rng = make(), np.random.default_rng(11)
+    for _ in range(5):
+        residual = autoregressive(rng, ROWS, rho, noise)
+        found = covariance.fit(residual)
+        matrix = covariance.discrepancy.matrix()
+        share = np.std(residual) / 0.01
+        for start in (covariance.start(0.1, share), covariance.start(share, 0.1),
+                      covariance.start(10.0, 10.0)):
+            other = optimize.minimize(
+                lambda values: covariance._cost(values, residual, matrix)[:2], start, jac=True,
+                method='L-BFGS-B', bounds=list(zip(covariance._low, covariance._high)))
+            assert covariance._cost(found, residual, matrix)[0] < other.fun + 0.05
+            # Values from an earlier fit may lie where the way to the best ones is long.
+            again = covariance.fit(residual, start)
+            assert covariance._cost(again, residual, matrix)[0] < other.fun + 0.05
+
+
+def test_covariances_of_another_discrepancy_share_no_more_than_drift_and_noise():
+    """They are laid out once for all sets of effects."""
+    shared, values = make(), make().start(1.0, 0.5)
+    other = smooth(ROWS, 0.03)
+    before = shared.point(values)
+    found, alone = shared.of(other).point(values), make().of(other).point(values)
+    assert np.array_equal(found.factor, alone.factor) and found.constant == alone.constant
+    assert np.array_equal(shared.point(values).factor, before.factor)
+    assert not np.allclose(found.factor, before.factor)
 
 
 def test_whitened_rows_are_independent():

@@ -16,13 +16,16 @@ one, because the bench says how large the discrepancy is, a is of its size or le
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 import copy
 import dataclasses
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg, special
+from scipy import linalg
+
+from hysteresis_ros.identification.gauss_newton import damped_step, DAMPING, LESS, MORE
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.discrepancy import Discrepancy
@@ -34,7 +37,8 @@ TIME_SPREAD = 1.5
 # Largest scale of the discrepancy (natural logarithm): two standard deviations of its prior. What
 # goes beyond is no error that the bench has seen.
 LARGEST_SCALE = 0.6
-EVALUATIONS = 25
+# Steps of a fit, at most, and the gain in log density that is not worth one.
+EVALUATIONS, SMALL_GAIN = 25, 0.01
 # Degrees of freedom of whitened residuals: those of clean arms of three constitutive models have a
 # kurtosis of 5 to 40, where a Gaussian has 3, and Student's t a finite one only above 4.
 TAILS = 4.0
@@ -62,7 +66,9 @@ class Point:
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """Return columns (n,) or (n, k) in units in which the covariance is the identity."""
-        return linalg.solve_triangular(self.factor, columns, lower=True, check_finite=False)
+        # A fit whitens thousands of times, where checks take longer than the solution.
+        whitened: np.ndarray = linalg.lapack.dtrtrs(self.factor, columns, lower=1)[0]
+        return whitened
 
     def log_density(self, whitened: np.ndarray) -> np.ndarray:
         """
@@ -80,8 +86,8 @@ class Point:
         -------
         ndarray, shape () or (k,)
         """
-        at_none = (special.gammaln(0.5 * (TAILS + 1.0)) - special.gammaln(0.5 * TAILS)
-                   + 0.5 * np.log(2.0 / TAILS))
+        at_none = (math.lgamma(0.5 * (TAILS + 1.0)) - math.lgamma(0.5 * TAILS)
+                   + 0.5 * math.log(2.0 / TAILS))
         return self.constant + len(whitened) * at_none - 0.5 * (TAILS + 1.0) * np.sum(
             np.log1p(whitened ** 2 / TAILS), axis=0)
 
@@ -139,10 +145,14 @@ class Covariance:
         self._high = np.array([LARGEST_SCALE, np.log(WIDEST * self._scale), np.log(3.0 * span),
                                np.log(min(max(largest_noise, _TINY), WIDEST * self._scale))])
         self._high = np.maximum(self._high, self._low)
+        # What does not depend on the discrepancy, by the values: sets of effects, each with a
+        # discrepancy of its own, are compared under the same ones.
+        self._drifts: dict[bytes, list[np.ndarray]] = {}
         self.points: list[Point] = []
 
     def of(self, discrepancy: Discrepancy) -> Covariance:
         """Return covariances with another discrepancy, and none at hand."""
+        # It shares the drifts.
         other = copy.copy(self)
         other.discrepancy, other.points = discrepancy, []
         return other
@@ -156,16 +166,24 @@ class Covariance:
                ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         """Return discrepancy (n, n), drift of each trial (m, m), and the covariance (n, n)."""
         discrepancy = np.exp(2.0 * values[0]) * matrix
-        drift, total = [], discrepancy.copy()
-        for own, gaps in zip(self._trials, self._gaps):
-            block = np.exp(2.0 * values[1]) * np.exp(-gaps / np.exp(values[2]))
-            total[own, own] += block
-            drift.append(block)
-        total.flat[::len(total) + 1] += np.exp(2.0 * values[3])
-        return discrepancy, drift, total
+        drift = self._drift(values)
+        return discrepancy, drift, self._total(discrepancy.copy(), drift, values)
 
-    def _prior(self, values: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return the log density of values (4,), and its gradient."""
+    def _drift(self, values: np.ndarray) -> list[np.ndarray]:
+        """Return the drift of each trial (m, m) for values (4,)."""
+        return [np.exp(2.0 * values[1]) * np.exp(-gaps / np.exp(values[2]))
+                for gaps in self._gaps]
+
+    def _total(self, total: np.ndarray, drift: Sequence[np.ndarray], values: np.ndarray
+               ) -> np.ndarray:
+        """Add to the discrepancy (n, n), in place, drift and noise."""
+        for own, block in zip(self._trials, drift):
+            total[own, own] += block
+        total.flat[::len(total) + 1] += np.exp(2.0 * values[3])
+        return total
+
+    def _prior(self, values: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        """Return the log density of values (4,), its gradient, and the curvatures, sign changed."""
         ratio = np.exp(values[1]) / self._scale
         white = np.exp(values[3]) / (3.0 * self.resolution + self._scale)
         away = (values[2] - self._middle) / TIME_SPREAD
@@ -174,7 +192,9 @@ class Covariance:
         gradient = np.array([
             -values[0] / self._spread ** 2, 1.0 - 2.0 * ratio ** 2 / (1.0 + ratio ** 2),
             -away / TIME_SPREAD, -2.0 * white ** 2 / (1.0 + white ** 2)])
-        return float(density), gradient
+        curvature = np.array([self._spread ** -2.0, (2.0 * ratio / (1.0 + ratio ** 2)) ** 2,
+                              TIME_SPREAD ** -2.0, (2.0 * white / (1.0 + white ** 2)) ** 2])
+        return float(density), gradient, curvature
 
     def point(self, values: np.ndarray) -> Point:
         """
@@ -191,8 +211,12 @@ class Covariance:
         """Iterate over the covariances for several values (4,); see `point`."""
         matrix = self.discrepancy.matrix()
         for values in several:
-            total = self._parts(values, matrix)[2]
-            factor = linalg.cholesky(total, lower=True, check_finite=False)
+            key = values.tobytes()
+            if key not in self._drifts:
+                self._drifts[key] = self._drift(values)
+            total = self._total(np.exp(2.0 * values[0]) * matrix, self._drifts[key], values)
+            # Fortran's order, and the same matrix: neither is it copied nor what `whiten` is given.
+            factor = linalg.cholesky(total.T, lower=True, overwrite_a=True, check_finite=False)
             constant = (self._prior(values)[0] - float(np.sum(np.log(np.diag(factor))))
                         - 0.5 * len(total) * np.log(2.0 * np.pi))
             yield Point(np.array(values), factor, constant)
@@ -201,7 +225,7 @@ class Covariance:
         """Return the covariance of white noise of a size alone: a fit is one by least squares."""
         count = self._trials[-1].stop
         values = np.array([self._low[0], self._low[1], self._middle, np.log(size)])
-        return Point(values, size * np.eye(count), -np.inf)
+        return Point(values, size * np.eye(count).T, -np.inf)
 
     def add(self, values: np.ndarray) -> Point:
         """Return the covariance for values (4,) and keep it among the `points`."""
@@ -245,7 +269,7 @@ class Covariance:
         residual : ndarray, shape (n,)
             Measured less simulated.
         values : ndarray, shape (4,), optional
-            Where to begin; by default both where all is noise and where all is drift.
+            Where to begin, besides where all is drift; by default where all is noise.
 
         Returns
         -------
@@ -253,40 +277,66 @@ class Covariance:
             As `Point.values`.
         """
         share = float(np.sqrt(np.mean(residual ** 2))) / self._scale
-        starts = [self.start(0.1, share), self.start(share, 0.1)] if values is None else [
-            np.clip(values, self._low, self._high)]
+        drifting = self.start(share, 0.1)
+        starts = [drifting, self.start(0.1, share) if values is None else np.clip(
+            values, self._low, self._high)]
         matrix = self.discrepancy.matrix()
-        from scipy import optimize     # a third of a second that bench tables do not need
         with np.errstate(all='ignore'):
-            found = [optimize.minimize(
-                self._cost, start, (residual, matrix), jac=True, method='L-BFGS-B',
-                bounds=list(zip(self._low, self._high)), options={'maxfun': EVALUATIONS})
-                for start in starts]
-        return min(found, key=lambda one: one.fun).x
+            found = [self._least_cost(start, residual, matrix) for start in starts]
+        return min(found, key=lambda one: one[0])[1]
+
+    def _least_cost(self, values: np.ndarray, residual: np.ndarray, matrix: np.ndarray
+                    ) -> tuple[float, np.ndarray]:
+        """Return the least cost near values (4,), and where it is."""
+        damping = DAMPING
+        cost, gradient, curvature = self._cost(values, residual, matrix)
+        for _ in range(EVALUATIONS):
+            step = damped_step(
+                curvature, gradient, damping, self._low - values, self._high - values)
+            if -(gradient + 0.5 * curvature @ step) @ step < SMALL_GAIN:
+                break
+            there = self._cost(values + step, residual, matrix)
+            if there[0] < cost:
+                values, (cost, gradient, curvature) = values + step, there
+                damping *= LESS
+            else:
+                damping = max(MORE * damping, DAMPING)
+        return cost, values
 
     def _cost(self, values: np.ndarray, residual: np.ndarray, matrix: np.ndarray
-              ) -> tuple[float, np.ndarray]:
-        """Return minus the log posterior density of values (4,), and its gradient."""
+              ) -> tuple[float, np.ndarray, np.ndarray]:
+        """
+        Return minus the log posterior density of values (4,), its gradient and its curvature.
+
+        The curvature is the mean of the observed and the expected one, in which all traces cancel:
+        the average information (Gilmour, Thompson and Cullis, Biometrics 51 (1995) 1440).
+        """
         discrepancy, drift, total = self._parts(values, matrix)
-        try:
-            factor = linalg.cho_factor(total, lower=True, check_finite=False)
-        except linalg.LinAlgError:
-            return 1e300, np.zeros(4)
-        solved = linalg.cho_solve(factor, residual, check_finite=False)
-        inverse = linalg.lapack.dpotri(factor[0], lower=1)[0]
+        factor, failed = linalg.lapack.dpotrf(total.T, lower=1, clean=0, overwrite_a=1)
+        if failed:
+            return math.inf, np.zeros(4), np.eye(4)
+        solved = linalg.lapack.dpotrs(factor, residual, lower=1)[0]
+        half_log_determinant = float(np.sum(np.log(np.diag(factor))))
+        # Derivatives of the covariance by the values, as (rows, columns, matrix) of their blocks.
+        noise = 2.0 * np.exp(2.0 * values[3])
+        changes = np.zeros((len(residual), 4))
+        changes[:, 0] = 2.0 * discrepancy @ solved
+        changes[:, 3] = noise * solved
+        inverse = linalg.lapack.dpotri(factor, lower=1)[0]
         diagonal = np.diag(inverse).copy()
         # Only the lower triangle is there; what is summed is symmetric.
         inverse = np.tril(inverse, -1)
-        prior, slope = self._prior(values)
 
         def trace(part: np.ndarray, own: slice = slice(None)) -> float:
-            inside = 2.0 * np.sum(inverse[own, own] * part) + diagonal[own] @ np.diag(part)
-            return 0.5 * (inside - solved[own] @ part @ solved[own])
+            return float(2.0 * np.sum(inverse[own, own] * part) + diagonal[own] @ np.diag(part))
 
-        blocks = list(zip(self._trials, drift, self._gaps))
-        gradient = np.array([
-            2.0 * trace(discrepancy), 2.0 * sum(trace(part, own) for own, part, _ in blocks),
-            sum(trace(part * gaps, own) for own, part, gaps in blocks) / np.exp(values[2]),
-            np.exp(2.0 * values[3]) * (np.sum(diagonal) - solved @ solved)])
-        cost = (0.5 * residual @ solved + float(np.sum(np.log(np.diag(factor[0])))) - prior)
-        return float(cost), gradient - slope
+        traces = np.array([2.0 * trace(discrepancy), 0.0, 0.0, noise * np.sum(diagonal)])
+        for own, part, gaps in zip(self._trials, drift, self._gaps):
+            slower = part * gaps / np.exp(values[2])
+            changes[own, 1] = 2.0 * part @ solved[own]
+            changes[own, 2] = slower @ solved[own]
+            traces[1:3] += 2.0 * trace(part, own), trace(slower, own)
+        density, slope, bend = self._prior(values)
+        information = changes.T @ linalg.lapack.dpotrs(factor, changes, lower=1)[0]
+        return (float(0.5 * residual @ solved) + half_log_determinant - density,
+                0.5 * (traces - changes.T @ solved) - slope, 0.5 * information + np.diag(bend))
