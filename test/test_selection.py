@@ -63,6 +63,17 @@ def test_the_planted_effect_is_the_most_probable_answer(payload):
     assert payload.sets.log_posterior(best) > payload.sets.log_posterior(frozenset()) + 5.0
 
 
+def test_only_the_best_single_effects_are_fitted_to_the_end(payload):
+    """The others are begun, and known all the same."""
+    quick = selection(payload.problem.model, payload.problem.measurements[0], refits=1, beam=1)
+    ended = {names for names, fit in quick.sets.fits.items()
+             if len(names) == 1 and fit.covariance is not None}
+    known = {frozenset([name]) for name in TRIED}
+    assert known <= set(quick.sets.fits) and known <= set(payload.sets.fits)
+    assert frozenset(['payload_error']) in ended < known
+    assert quick.sets.valid()[0] == payload.sets.valid()[0]
+
+
 def test_what_an_effect_changes_is_as_uncertain_as_its_equation(payload):
     """By the share `form` with two standard deviations, besides the base model's own error."""
     fit = payload.sets.fits[frozenset(['payload_error'])]
@@ -237,6 +248,7 @@ def test_a_pair_that_is_stuck_is_fitted_from_all_starts(monkeypatch):
                                 for effect in good.effects]], found._metric(), 0)
     assert stuck.log_evidence < good.log_evidence - 20.0
     monkeypatch.setitem(found.sets.fits, names, stuck)
+    monkeypatch.setattr(found, 'settings', dataclasses.replace(found.settings, refits=6))
     found._fit_from_all_starts(2)
     assert found.sets.fits[names].log_evidence > good.log_evidence - 1.0
 

@@ -60,9 +60,12 @@ def test_a_fit_that_was_judged_along_its_way_keeps_its_covariance(model, jobs, f
     fitter = fitter_of(model, measured, jobs)
     starts = [[neutral(fitter, name)] for name in ('payload_error', 'supply_sag')]
     point = fitter.covariance.points[0]
-    found = fitter.shared(lambda effects: fitter.along(fitter.fit_one(effects, point)), starts)
-    for fit, start in zip(found, starts):
-        alone = fitter.along(fitter.fit_one(start, point))
+
+    def fitted(effects):
+        return [fitter.along(fit) for fit in fitter.fit_one(effects, point)]
+
+    for (fit,), start in zip(fitter.shared(fitted, starts), starts):
+        alone, = fitted(start)
         assert fit.log_evidence == alone.log_evidence and fit.judged == alone.judged
         assert np.array_equal(fit.covariance.discrepancy.matrix(),
                               alone.covariance.discrepancy.matrix())

@@ -41,8 +41,8 @@ LEAST_GAIN = 0.1
 LONGEST = 1.0
 # The base model's own error bends an estimate by up to about this share.
 ESTIMATE_SLACK = 0.15
-# A fit without its covariance, that covariance's discrepancy, and phases to keep.
-Answer: TypeAlias = 'tuple[Fit, Discrepancy | None, list[np.ndarray | None]]'
+# Fits without their covariances, these covariances' discrepancies, and phases to keep.
+Answer: TypeAlias = 'list[tuple[Fit, Discrepancy | None, list[np.ndarray | None]]]'
 # Standard deviations to each side of a 95 % interval.
 FACTOR = 1.96
 
@@ -239,17 +239,17 @@ class Fitter:
         -------
         list of Fit
         """
-        fits = self.shared(lambda effects: self.fit_one(effects, point, steps, exact), sets)
-        return [fit for fit in fits if fit is not None]
+        found = self.shared(lambda effects: self.fit_one(effects, point, steps, exact), sets)
+        return [fit for fits in found for fit in fits]
 
     def fit_one(self, effects: Sequence[Effect], point: Point, steps: int = MOST_STEPS,
-                exact: bool = True) -> Fit | None:
-        """Fit one set of effects; None if its simulation fails. See `fit`."""
+                exact: bool = True) -> list[Fit]:
+        """Fit one set of effects; none if its simulation fails. See `fit`."""
         walk = _Walk(effects, self.problem.kind)
         walk.predicted, = self._at(walk, [walk.vector])
         walk.cost = self._cost(walk, walk.vector, walk.predicted, point)
         if not math.isfinite(walk.cost):
-            return None
+            return []
         for _ in range(steps):
             if walk.jacobian is None:
                 self._differentiate(walk)
@@ -267,40 +267,36 @@ class Fitter:
         if walk.jacobian is None:
             self._differentiate(walk)
         if not np.all(np.isfinite(walk.jacobian)):
-            return None
-        return self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
-                              walk.predicted, walk.jacobian, duration=self.problem.duration))
+            return []
+        return [self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
+                               walk.predicted, walk.jacobian, duration=self.problem.duration))]
 
-    def shared(self, fit: Callable[[Sequence[Effect]], Fit | None],
-               sets: Sequence[Sequence[Effect]]) -> list[Fit | None]:
+    def shared(self, fit: Callable[[Sequence[Effect]], list[Fit]],
+               sets: Sequence[Sequence[Effect]]) -> list[list[Fit]]:
         """
-        Return what `fit` makes of each set of effects, shared with forks, or else with threads.
+        Return the fits that are made of each set of effects, shared with forks, or with threads.
 
         Each begins with the phases known before all of them, whoever comes first.
 
         Parameters
         ----------
         fit : callable
-            Of a set of effects, to a `Fit` or None.
+            Of a set of effects, to a list of `Fit`.
         sets : sequence of list of Effect
 
         Returns
         -------
-        list of Fit or None
+        list of list of Fit
         """
         problem = self.problem
 
-        def answer(effects: Sequence[Effect]) -> Answer | None:
+        def answer(effects: Sequence[Effect]) -> Answer:
             with (problem.no_phases_kept() if needs_phase(self._all(effects))
                   else contextlib.nullcontext()):
-                found = fit(effects)
-                if found is None:
-                    return None
-                phases = problem.phases(self._all(found.effects))
-            if found.covariance is None:
-                return found, None, phases
-            # A covariance is large, and all but its discrepancy is known here.
-            return dataclasses.replace(found, covariance=None), found.covariance.discrepancy, phases
+                # A covariance is large, and all but its discrepancy is known here.
+                return [(dataclasses.replace(one, covariance=None),
+                         one.covariance.discrepancy if one.covariance else None,
+                         problem.phases(self._all(one.effects))) for one in fit(effects)]
 
         if forks(problem.jobs) < 2 and problem.rows >= WORTH_THREADS:
             # Threads have one memory of phases.
@@ -311,15 +307,14 @@ class Fitter:
                        for effects, one in zip(sets, alone)]
         else:
             answers = map_in_forks(answer, sets, problem.jobs)
-        fits: list[Fit | None] = []
-        for one in answers:
-            found, discrepancy, phases = one or (None, None, [])
-            if found is not None:
-                problem.keep_phases(self._all(found.effects), phases)
-                if discrepancy is not None:
-                    found = dataclasses.replace(found, covariance=self.covariance.of(discrepancy))
-            fits.append(found)
-        return fits
+        found: list[list[Fit]] = []
+        for fits in answers:
+            found.append([])
+            for one, discrepancy, phases in fits:
+                problem.keep_phases(self._all(one.effects), phases)
+                found[-1].append(dataclasses.replace(
+                    one, covariance=self.covariance.of(discrepancy) if discrepancy else None))
+        return found
 
     def _all(self, effects: Sequence[Effect]) -> list[Effect]:
         """Return the effects of the model with further ones."""
@@ -359,11 +354,12 @@ class Fitter:
         else:
             best = dataclasses.replace(fit, judged=len(self.covariance.points))
             points = self._points_of(fit.covariance, fit.judged)
+        columns = np.column_stack([self.problem.measured - fit.predicted, fit.jacobian])
+        precision = np.diag(spread ** -2.0)
         for point in points:
-            whitened = point.whiten(np.column_stack([
-                self.problem.measured - fit.predicted, fit.jacobian]))
+            whitened = point.whiten(columns)
             residual, jacobian = whitened[:, 0], whitened[:, 1:]
-            matrix = jacobian.T @ jacobian + np.diag(spread ** -2.0)
+            matrix = jacobian.T @ jacobian + precision
             evidence = (float(point.log_density(residual)) + prior
                         - 0.5 * float(np.linalg.slogdet(matrix)[1]))
             if evidence > best.log_evidence:
@@ -402,12 +398,14 @@ class Fitter:
                  for one in self.fit([fit.effects], self.point(fit), POLISHING_STEPS)]
         return max([fit, *again], key=lambda one: one.log_evidence)
 
-    def refined(self, fit: Fit) -> Fit:
-        """Fit the covariance to the residual of a fit, then the effects under it once more."""
+    def covariance_values(self, fit: Fit) -> np.ndarray:
+        """Return the values (4,) of the covariance that suit the residual of a fit best."""
         own = fit.covariance or self.covariance
-        values = own.fit(self.problem.measured - fit.predicted, fit.require_values())
-        self.covariance.add(values)
-        point = own.point(values)
+        return own.fit(self.problem.measured - fit.predicted, fit.require_values())
+
+    def refined(self, fit: Fit, values: np.ndarray) -> Fit:
+        """Return a fit whose effects are fitted once more, under a covariance of values (4,)."""
+        point = (fit.covariance or self.covariance).point(values)
         better = self.fit([fit.effects], point, POLISHING_STEPS) if len(fit.vector) else []
         better = [one if fit.covariance is None else self.along(one) for one in better]
         return max([self.judge(fit), *better], key=lambda one: one.log_evidence)

@@ -26,6 +26,7 @@ from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_st
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 from hysteresis_ros.effects import Effect
+from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -118,13 +119,14 @@ class Selection:
 
     def _fit_alone(self) -> None:
         """
-        Fit every effect by itself, from its best few starts.
+        Fit every effect by itself, from its best few starts; only the best ones to the end.
 
         Where a response bends, the start that scores best by linearisation may be the only one from
         which a fit goes astray.
         """
         starts = [[effect] for effect in self.alone.best_starts()]
-        self._begin(starts, len(starts))
+        for fit in self._begin(starts, BEGUN * self.settings.refits):
+            self.sets.keep(fit)
         self.sets.p_values = self._significance()
         self._grown.add(frozenset())
         self._refine(1)
@@ -219,7 +221,10 @@ class Selection:
                                 FIRST_STEPS, exact=False)
         found.sort(key=lambda one: -one.log_evidence)
         found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
-        return self.fitter.refined(max(found, key=lambda one: one.log_evidence))
+        best = max(found, key=lambda one: one.log_evidence)
+        values = self.fitter.covariance_values(best)
+        self.covariance.add(values)
+        return self.fitter.refined(best, values)
 
     def _starts_of(self, effect: Effect, fit: Fit) -> list[Effect]:
         """Return where to start an effect together with those of a fit."""
@@ -255,13 +260,27 @@ class Selection:
         self._begin([effects for _, effects in order[:BEGUN * self.settings.refits]],
                     self.settings.refits)
 
-    def _begin(self, sets: Sequence[Sequence[Effect]], most: int) -> None:
-        """Fit sets for a few steps, and the best of these to the end, each from one start."""
+    def _begin(self, sets: Sequence[Sequence[Effect]], most: int) -> list[Fit]:
+        """
+        Fit sets for a few steps, and the best of these to the end, each from one start.
+
+        Parameters
+        ----------
+        sets : sequence of list of Effect
+        most : int
+            How many are fitted to the end.
+
+        Returns
+        -------
+        list of Fit
+            Those that were only begun, the best of each set of effects.
+        """
         begun = self.fitter.fit(sets, self._metric(), FIRST_STEPS, exact=False)
         best: dict[tuple[str, ...], Fit] = {}
         for fit in sorted(begun, key=lambda fit: -fit.log_evidence):
             best.setdefault(fit.names, fit)
         self._fit([fit.effects for fit in list(best.values())[:most]])
+        return list(best.values())[most:]
 
     def _fit_from_all_starts(self, size: int) -> None:
         """
@@ -321,14 +340,13 @@ class Selection:
 
     def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
-        for fit in self.fitter.shared(self._fitted, sets):
-            if fit is not None:
-                self.sets.keep(fit)
+        for fit in itertools.chain(*self.fitter.shared(self._fitted, sets)):
+            self.sets.keep(fit)
 
-    def _fitted(self, effects: Sequence[Effect]) -> Fit | None:
-        """Return a set fitted to the end and judged along its own way, None if that fails."""
-        fit = self.fitter.fit_one(effects, self._metric())
-        return fit and self.fitter.polished(self.fitter.along(fit))
+    def _fitted(self, effects: Sequence[Effect]) -> list[Fit]:
+        """Return a set fitted to the end and judged along its own way, nothing if that fails."""
+        return [self.fitter.polished(self.fitter.along(fit))
+                for fit in self.fitter.fit_one(effects, self._metric())]
 
     def _metric(self) -> Point:
         """Return the covariance in whose units fits are made: the expected discrepancy's."""
@@ -336,17 +354,27 @@ class Selection:
 
     def _refine(self, size: int) -> None:
         """Give the most probable sets of a size covariances of their own, then judge all anew."""
-        for _ in range(self.settings.refits):
-            found = [names for names in self._ranked_of(size) if names not in self._refined]
-            if not found:
-                break
-            names = found[0]
-            self._refined.add(names)
-            self.sets.fits[names] = self.fitter.refined(self.sets.fits[names])
-            least = self.fitter.least_squares(self.sets.fits[names])
-            self.sets.keep_least(names, least.predicted)
+        found = [names for names in self._ranked_of(size) if names not in self._refined]
+        found = found[:self.settings.refits]
+        self._refined.update(found)
+        values = dict(zip(found, map_in_forks(
+            self.fitter.covariance_values, [self.sets.fits[names] for names in found],
+            self.problem.jobs)))
+        for own in values.values():
+            self.covariance.add(own)
+
+        def refined(effects: Sequence[Effect]) -> list[Fit]:
+            names = frozenset(effect.id for effect in effects)
+            fit = self.fitter.refined(self.sets.fits[names], values[names])
+            least = self.fitter.least_squares(fit)
             # Under a covariance the way to the maximum is rough, and not under white noise.
-            self.sets.keep(self.fitter.polished(self.fitter.along(least)))
+            return [fit, least, self.fitter.polished(self.fitter.along(least))]
+
+        for names, (fit, least, polished) in zip(found, self.fitter.shared(
+                refined, [self.sets.fits[names].effects for names in found])):
+            self.sets.fits[names] = fit
+            self.sets.keep_least(names, least.predicted)
+            self.sets.keep(polished)
         self.sets.judge_all()
 
     def _refine_best(self) -> None:
