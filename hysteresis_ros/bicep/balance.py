@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from hysteresis_ros.model.chain import Chain
 
 # Between two angles of the grid the linkage is a straight line, which costs less than 1e-6 rad.
-GRID = math.radians(0.1)
+GRID = math.radians(0.2)
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
 _NO_MUSCLE = np.zeros((0, 4)), 0.0
