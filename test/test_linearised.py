@@ -134,8 +134,8 @@ def test_autocorrelated_noise_is_seldom_taken_for_an_effect(trials, rows, rho):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('trials, rows, rho, draws', [
-    pytest.param(4, 60, 0.9, 300, marks=pytest.mark.long), (1, 60, 0.98, 1000)])
+@pytest.mark.long
+@pytest.mark.parametrize('trials, rows, rho, draws', [(4, 60, 0.9, 300), (1, 60, 0.98, 1000)])
 def test_autocorrelated_noise_is_taken_for_an_effect_as_often_as_is_said(trials, rows, rho, draws):
     """
     From 3 to 8 %, so that the test is neither blind nor sees what is not there.

@@ -52,7 +52,7 @@ CREEP = {
 }
 
 
-@pytest.mark.parametrize('form', CREEP)
+@pytest.mark.parametrize('form', ['kelvin_voigt', pytest.param('power', marks=pytest.mark.long)])
 def test_creep_by_another_law_is_creep(monkeypatch, form):
     creep_on = ParallelWires._creep_on
 

@@ -35,7 +35,7 @@ def percent(model, measurement, span):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('alloy', ALLOYS)
+@pytest.mark.parametrize('alloy', ['nitihf', pytest.param('nitico', marks=pytest.mark.long)])
 def test_the_load_that_a_plain_operator_does_not_know_is_found(data, alloy):
     """Stress shifts the transformation and makes it larger: two effects, on stresses not seen."""
     training, held_out, allowed = ALLOYS[alloy]
