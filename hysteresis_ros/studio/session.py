@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hysteresis_ros.cli.outputs import check_file, Given, refuse_input
 from hysteresis_ros.comparison.compare import check_alike, running_time, trial_numbers
 from hysteresis_ros.diagnosis.extend import base_of, extend, extend_by_hand, Extension
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -26,6 +25,7 @@ from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue, effect_class
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements.quantities import shown
+from hysteresis_ros.paths import check_file, Given, refuse_input
 from hysteresis_ros.report.provenance import Origin
 from hysteresis_ros.report.recording import extremes
 from hysteresis_ros.studio.commands import Source
