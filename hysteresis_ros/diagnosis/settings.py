@@ -24,7 +24,7 @@ class Settings:
         Sets from which larger ones are grown.
     refits : int
         Sets that are fitted in full of those scored by linearisation, a generation. On 80 cases of
-        one wire 6 name one less than 4 and take a quarter longer, and with 3 one of 4 pairs is lost.
+        one wire 6 name one less than 4 and take a quarter longer, and 3 lose one of four pairs.
     scale_spread : float
         Spread (natural logarithm) of the discrepancy's size against that seen on the bench,
         because the arm goes other ways than the bench: a third.
