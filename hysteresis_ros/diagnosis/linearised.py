@@ -68,8 +68,8 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
     names : sequence of str
         Effects to linearise.
     earlier : sequence of Start, optional
-        Starts linearised together with other effects. Of the usual ones of an effect only the
-        few are linearised anew that score best with the derivatives that they had there.
+        Starts linearised together with other effects. Of the usual ones of an effect only that
+        is linearised anew which scores best with the derivatives that it had there.
     point : Point, optional
         Covariance of the residual; needed with `earlier`.
 
@@ -115,7 +115,7 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
 def _promising(walks: Sequence[_Moves], changes: np.ndarray, residual: np.ndarray,
                known: Mapping[tuple, np.ndarray], point: Point) -> list[int]:
     """
-    Return the indices of the best few known starts of each effect, and of all others.
+    Return the indices of the best known start of each effect, and of all others.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _promising(walks: Sequence[_Moves], changes: np.ndarray, residual: np.ndarra
             starts.append(Start(
                 walk.start, change + columns @ ((mean - walk.vector) / spread), columns))
     best = Linearised([point], residual, starts).indices_of_best()
-    return sorted([*others, *(places[index] for own in best.values() for index in own)])
+    return sorted([*others, *(places[own[0]] for own in best.values())])
 
 
 def _key(effect: Effect) -> tuple:
