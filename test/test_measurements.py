@@ -112,6 +112,14 @@ def test_values_that_are_unlikely_in_their_unit_are_warned_about(columns, words)
     assert re.search(words, found[0])
 
 
+def test_an_angle_that_jumps_by_a_turn_is_warned_about():
+    """Between trials an arm may have been turned by hand."""
+    found = Measurement.from_columns(arm(angle=[0.1, 6.2, 0.1, 0.1, 0.2, 6.3])).warnings
+    assert len(found) == 1
+    assert re.search('jumps by a turn from row 0 to row 1, and 2 times more: .*unwrap', found[0])
+    assert Measurement.from_columns(arm(angle=[0.1, 0.2, 0.1, 6.3, 6.2, 6.4])).warnings == ()
+
+
 def test_all_problems_of_a_table_are_said_at_once():
     columns = arm(angle=[90, 80, 70, 90, 70, 80], time=[0, 30, 20, 0, 30, 60], voltage=[6000] * 6)
     with pytest.raises(MeasurementError) as refused:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 SETTLED_HOLD = 20.0
 """Rows of a run that are at least this many seconds apart are settled states."""
+TURN, ALMOST = 2.0 * np.pi, 0.1
+"""A turn [rad], and the share of it that an arm moves from one row to the next while it wraps."""
 CALENDAR = 1e8
 """Times from here on [s], three years, are of a calendar and not since the muscle was cold."""
 
@@ -119,7 +121,7 @@ class Measurement:
             problems = order_problems(measurement) + unit_problems(largest, origin)
         refuse(str(source), problems)
         return replace(measurement, warnings=(
-            *notes, *name_warnings(measurement),
+            *notes, *name_warnings(measurement), *wrap_warnings(measurement),
             *(f'{source}: {note}' for note in unit_warnings(largest, origin))))
 
     @property
@@ -391,3 +393,28 @@ def is_known(name: str) -> bool:
 def trial_list(trials: Iterable[float]) -> str:
     """Return identifiers of trials for a message."""
     return ', '.join(f'{trial:g}' for trial in list(trials)[:20])
+
+
+def wrap_warnings(measurement: Measurement) -> tuple[str, ...]:
+    """
+    Return where the angle of an arm first jumps by a turn, one line or none.
+
+    Parameters
+    ----------
+    measurement : Measurement
+
+    Returns
+    -------
+    tuple of str
+
+    """
+    if measurement.response != 'angle':
+        return ()
+    steps = np.diff(measurement.columns['angle'])
+    within = np.diff(measurement.columns['trial']) == 0
+    rows = np.flatnonzero(within & (np.abs(np.abs(steps) - TURN) < ALMOST * TURN))
+    if not len(rows):
+        return ()
+    return (f'{measurement.source}: angle jumps by a turn from row {rows[0]} to row {rows[0] + 1}'
+            f'{f", and {len(rows) - 1} times more" if len(rows) > 1 else ""}: an encoder that '
+            'wraps? Unwrap it trial by trial (numpy.unwrap)',)
