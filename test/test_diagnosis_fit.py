@@ -380,8 +380,8 @@ def test_what_the_bench_says_of_an_effect_is_one_of_its_starts():
 
 
 @pytest.mark.parametrize('name', ['end_stop', 'overload', 'encoder_eccentricity', 'heat_loss'])
-def test_of_many_starts_the_best_are_linearised_with_other_effects(name):
-    """With the derivatives that they had alone those have the best evidence that do with theirs."""
+def test_of_many_starts_the_best_is_linearised_with_other_effects(name):
+    """With the derivatives that they had alone that has the best evidence which does with its."""
     model = bicep_model()
     payload = effect_of(model, 'payload_error', dm=15.0)
     fitter = fitter_of(model, noisy(model, [payload, effect_of(model, name)]))
@@ -393,14 +393,16 @@ def test_of_many_starts_the_best_are_linearised_with_other_effects(name):
     residual = fitter.problem.measured - other.predicted
     whole, part = (Linearised([point], residual, starts).singles()[name,]
                    for starts in (every, few))
-    assert whole[1][0].values == part[1][0].values and whole[0] == part[0]
+    assert whole[1][0].values == part[1][0].values
+    assert whole[0] == pytest.approx(part[0], rel=1e-9)
     usual_ones = [start.values for start in starts_of(effect_of(model, name), 'arm')]
-    assert len(usual_ones) > 3 == sum(start.effect.values in usual_ones for start in few)
+    assert len(usual_ones) > 3
+    assert sum(start.effect.values in usual_ones for start in few) == 1
     # What the response suggests is looked at in any case.
     suggested = [start.effect.values for start in every
                  if start.id == name and start.effect.values not in usual_ones]
     assert all(values in [start.effect.values for start in few] for values in suggested)
-    assert sum(start.id == 'supply_sag' for start in few) == 2
+    assert sum(start.id == 'supply_sag' for start in few) == 1
 
 
 def test_what_the_response_suggests_is_a_start_in_addition():

@@ -25,7 +25,7 @@ from benchmark.reference.swing import Swing
 from hysteresis_ros.effects.stages import Statics
 
 # Between two angles of the grid the linkage is a straight line, which costs less than 1e-6 rad.
-GRID = math.radians(0.1)
+GRID = math.radians(0.2)
 # A dt longer than this [s] leads to a settled state to which dynamics contribute nothing.
 LONGEST_TRANSIENT = 5.0
 # Longest dt of an arm that rings, as a phase [rad] of its fastest ringing; from 2.4 the method
