@@ -133,6 +133,14 @@ def test_what_the_load_does_is_named_on_every_specimen_and_no_wear(muscle, seed)
 
 
 @pytest.mark.slow
+def test_sets_that_fit_badly_on_the_coarse_grid_are_not_lost():
+    """There an R-phase leaves half the error of what is true, which loads left out are for."""
+    model, length = bench_of('tanaka', 16101)
+    found = diagnose(model, [length], seed=0)
+    assert {*found.missing} == {'stress_dependence', 'phase_modulus', 'transformation_slopes'}
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', [pytest.param(7501, marks=pytest.mark.long), 7509])
 def test_two_effects_that_stand_for_each_other_are_not_both_left_out(seed):
     """

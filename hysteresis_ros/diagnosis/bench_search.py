@@ -30,10 +30,6 @@ if TYPE_CHECKING:
 GROWN = 3
 # Share by which an effect has to lower the error of the rows that its set is fitted to.
 WORTH_JUDGING = 0.01
-# Sets of several effects are fitted on the finer grid if their error is not larger than that of the
-# best by this factor: they do not come to be the best there, by rows fitted or held out, of which
-# twenty benches of four constitutive models had none.
-WORTH_REFINING = 2.0
 
 
 class BenchSearch:
@@ -108,9 +104,7 @@ class BenchSearch:
             # On the coarse grid a loop's width hides what an effect of the load does.
             found += [fit for fit in fitted if _but_one_universal(fit)
                       or fit in generation and all_help(fit, errors)]
-        largest = WORTH_REFINING * min(map(self._fitted_error, found), default=0.0)
-        return [fit for fit in found
-                if len(fit.effects) == 1 or self._fitted_error(fit) <= largest]
+        return found
 
     def _best(self, fits: Sequence[Fit], count: int) -> list[Fit]:
         """Return those with the least errors of fitted rows, and those of universal effects."""
