@@ -74,6 +74,16 @@ def test_only_the_best_single_effects_are_fitted_to_the_end(payload):
     assert quick.sets.valid()[0] == payload.sets.valid()[0]
 
 
+def test_a_fit_that_is_better_from_the_least_squares_on_is_kept(model, monkeypatch):
+    """Under a covariance the way to the maximum may be too rough."""
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+    found._refined.clear()
+    monkeypatch.setattr(found.fitter, 'polished', lambda fit: dataclasses.replace(
+        fit, log_evidence=1e6))
+    found._refine(1)
+    assert found.sets.fits[frozenset(['payload_error'])].log_evidence == 1e6
+
+
 def test_what_an_effect_changes_is_as_uncertain_as_its_equation(payload):
     """By the share `form` with two standard deviations, besides the base model's own error."""
     fit = payload.sets.fits[frozenset(['payload_error'])]

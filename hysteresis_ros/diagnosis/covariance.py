@@ -215,7 +215,7 @@ class Covariance:
             if key not in self._drifts:
                 self._drifts[key] = self._drift(values)
             total = self._total(np.exp(2.0 * values[0]) * matrix, self._drifts[key], values)
-            # Fortran's order, and the same matrix: neither is it copied nor what `whiten` is given.
+            # Transposed it is the same matrix in Fortran's order, which LAPACK need not copy.
             factor = linalg.cholesky(total.T, lower=True, overwrite_a=True, check_finite=False)
             constant = (self._prior(values)[0] - float(np.sum(np.log(np.diag(factor))))
                         - 0.5 * len(total) * np.log(2.0 * np.pi))
@@ -317,7 +317,7 @@ class Covariance:
             return math.inf, np.zeros(4), np.eye(4)
         solved = linalg.lapack.dpotrs(factor, residual, lower=1)[0]
         half_log_determinant = float(np.sum(np.log(np.diag(factor))))
-        # Derivatives of the covariance by the values, as (rows, columns, matrix) of their blocks.
+        # Columns (dK / dvalue) K^-1 residual, of which gradient and curvature are made.
         noise = 2.0 * np.exp(2.0 * values[3])
         changes = np.zeros((len(residual), 4))
         changes[:, 0] = 2.0 * discrepancy @ solved

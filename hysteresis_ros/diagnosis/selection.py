@@ -355,7 +355,6 @@ class Selection:
     def _refine(self, size: int) -> None:
         """Give the most probable sets of a size covariances of their own, then judge all anew."""
         found = [names for names in self._ranked_of(size) if names not in self._refined]
-        found = found[:self.settings.refits]
         self._refined.update(found)
         values = dict(zip(found, map_in_forks(
             self.fitter.covariance_values, [self.sets.fits[names] for names in found],
