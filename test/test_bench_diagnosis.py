@@ -291,6 +291,34 @@ def test_a_fold_is_predicted_by_weights_and_parameters_of_the_others():
     assert np.abs(predicted[0] - predicted[1])[~rows].max() > 1e-4
 
 
+def test_a_fit_that_stays_above_another_one_is_given_up():
+    """What ends below it ends where a fit without that limit does."""
+    measurement = table(lagging)
+    model = identify(measurement, operator='preisach', levels=(12, 12)).model
+    fitter = BenchFitter(problem_for(model, [measurement]))
+    lag = catalogue()['valve_lag'](model.surroundings).with_values(filling=8.0, venting=8.0)
+    whole = fitter.fit([lag])
+    error = fitter.error(whole.predicted)
+    assert fitter.fit_below([lag], 0.5 * error) is None
+    below = fitter.fit_below([lag], 2.0 * error)
+    assert fitter.error(below.predicted) == pytest.approx(error, rel=0.01)
+    np.testing.assert_allclose(below.vector, whole.vector, atol=0.02)
+
+
+def test_where_weights_are_sought_first_does_not_change_them():
+    """They are the only ones of least squares, and are found from any others."""
+    measurement = table(lagging)
+    model = identify(measurement, operator='preisach', levels=(12, 12)).model
+    fitter = BenchFitter(problem_for(model, [measurement]))
+    lag = catalogue()['valve_lag'](model.surroundings).with_values(filling=2.0, venting=2.0)
+    fit = Response(fitter.problem, [], [lag]).fit(ParameterVector([lag], 'bench').vector())
+    assert fit.passive.any() and not fit.passive.all()
+    held_out = [fitter.cross_validate(dataclasses.replace(fit, passive=passive)).held_out
+                for passive in (fit.passive, np.ones_like(fit.passive), None)]
+    for other in held_out[1:]:
+        np.testing.assert_allclose(other, held_out[0], rtol=0.0, atol=1e-6 * np.ptp(held_out[0]))
+
+
 def test_an_extended_model_says_what_was_fitted():
     """Weights and the martensite share that they show come into agreement, under any load."""
     columns = table(creeping).columns

@@ -79,6 +79,9 @@ class Fit:
         How many covariances at hand were tried with `covariance`.
     duration : float
         Of the recording that was fitted [s].
+    passive : ndarray of bool, shape (K + 1,), or None
+        On a bench: the weights of H2 that are not at their bound, and the bias, with which fits of
+        neighbouring values begin.
     """
 
     effects: list[Effect]
@@ -92,6 +95,7 @@ class Fit:
     covariance: Covariance | None = None
     judged: int = 0
     duration: float = 0.0
+    passive: np.ndarray | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -80,7 +80,9 @@ class Response:
         effects = self.parameters.with_vector(vector)
         free = ParameterVector(effects, self.problem.kind).entries
         kept = [entry in free for entry in self.parameters.entries]
-        return Fit(effects, vector[kept], self.predicted(vector), duration=self.problem.duration)
+        solution = self._solution(vector)
+        return Fit(effects, vector[kept], solution.predicted, duration=self.problem.duration,
+                   passive=solution.weights.passive)
 
     def predicted(self, vector: np.ndarray) -> np.ndarray:
         """Return the response of all rows, shape (n,)."""
@@ -159,6 +161,23 @@ class BenchFitter:
         return response.fit(response.minimise(
             response.parameters.vector(), evaluations, tolerance))
 
+    def fit_below(self, effects: Sequence[Effect], error: float) -> Fit | None:
+        """
+        Fit from the present values of `effects`, or give up where that promises too little.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            Effects to fit; their values are the start.
+        error : float
+            Largest error after the first steps that is worth going on, in the response's unit.
+        """
+        response = Response(self.problem, self.fixed, effects)
+        vector = response.minimise(response.parameters.vector(), FIRST_EVALUATIONS, TOLERANCE)
+        if not self.error(response.predicted(vector)) <= error:
+            return None
+        return response.fit(response.minimise(vector, MOST_EVALUATIONS, TOLERANCE))
+
     def search(self, known: Sequence[Effect], effect: Effect) -> Fit:
         """
         Fit one more effect together with the `known` ones, from its best starts.
@@ -210,6 +229,7 @@ class BenchFitter:
     def cross_validate(self, fit: Fit) -> Fit:
         """Return a fit with the response of every row as predicted by a fit to the other folds."""
         problem, held_out = self.problem.holding_out(), np.empty(len(self.problem.measured))
+        problem.begin_near(fit.passive)
         for fold in problem.folds:
             test = problem.fold == fold
             response = Response(problem, self.fixed, fit.effects, ~test)

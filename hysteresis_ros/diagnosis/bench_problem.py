@@ -210,6 +210,17 @@ class BenchProblem(Problem):
             other._holding_out = self._holding_out.apart()
         return other
 
+    def begin_near(self, passive: np.ndarray | None) -> None:
+        """
+        Let weights be sought near others first, whatever was found before.
+
+        Parameters
+        ----------
+        passive : ndarray of bool, shape (K + 1,), or None
+            Those of a neighbouring problem that are not at their bound, and the bias.
+        """
+        self._passive = {} if passive is None else {None: passive}
+
     def holding_out(self) -> BenchProblem:
         """Return the same rows and grid, with weights regularised as for rows held out."""
         if self._holding_out is None:

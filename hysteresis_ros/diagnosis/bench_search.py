@@ -129,8 +129,9 @@ class BenchSearch:
                       and errors[other] < (1.0 - WORTH_JUDGING) * errors[names]]
             if larger:
                 ended = found[min(larger, key=lambda one: errors[one])]
-                starts.append([effect for effect in ended.effects if effect.id in names])
-        for fit in self._in_parallel(_fitted, self.fitter, starts):
+                starts.append(([effect for effect in ended.effects if effect.id in names],
+                               (1.0 + WORTH_JUDGING) * errors[names]))
+        for fit in self._in_parallel(_fitted_below, self.fitter, starts):
             names = frozenset(fit.names)
             if self.fitter.error(fit.predicted) < errors[names]:
                 found[names] = fit
@@ -211,6 +212,14 @@ def _fitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
     """Fit some effects from their present values."""
     with np.errstate(all='ignore'):
         return _finite(fitter.fit(effects))
+
+
+def _fitted_below(fitter: BenchFitter, start: tuple[Sequence[Effect], float]) -> Fit | None:
+    """Fit some effects from their present values, unless the error stays above another one."""
+    effects, error = start
+    with np.errstate(all='ignore'):
+        fit = fitter.fit_below(effects, error)
+        return None if fit is None else _finite(fit)
 
 
 def _refitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
