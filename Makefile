@@ -56,11 +56,12 @@ IN_WORKSPACE := export PATH="$$PWD/$(VENV)/bin:$$PATH"; \
 	. ./$(WORKSPACE)/install/local_setup.sh; \
 	HYSTERESIS_ROS_PREFIX="$$PWD/$(PREFIX)"
 
-.PHONY: help build demo test benchmark hidden docs pictures firmware fuzz faults clean force
+.PHONY: help build demo test test-all benchmark hidden docs pictures firmware fuzz faults clean force
 
 help:
 	@echo 'make demo       the whole system on the simulated arm: identify, drive, record, compare'
-	@echo 'make test       all tests and linters'
+	@echo 'make test       tests and linters, but for those that take many seconds each'
+	@echo 'make test-all   all tests: whole diagnoses, sessions, browsers, machine code; with coverage'
 	@echo 'make benchmark  speed and accuracy, into benchmark.json'
 	@echo 'make hidden     the hidden-effect grid, into hidden.json'
 	@echo 'make docs       the pages of docs/ with the programming interface, into build/docs'
@@ -104,10 +105,15 @@ demo: build
 	@$(IN_WORKSPACE) HYSTERESIS_ROS_AVR="$$PWD/firmware/build" \
 		$(PREFIX)/lib/hysteresis_ros/hysteresis demo $(DEMO_ARGS)
 
+PYTEST := $(VENV)/bin/python -m pytest -o cache_dir=$(WORKSPACE)/build/pytest_cache
+
+# With arguments of one's own, pytest alone says what runs.
 test: build
+	@$(IN_WORKSPACE) $(if $(strip $(PYTEST_ARGS)),,tools/quick_tests.sh) $(PYTEST) $(PYTEST_ARGS)
+
+test-all: build
 	@$(IN_WORKSPACE) COVERAGE_CORE=sysmon COVERAGE_FILE=$(WORKSPACE)/build/coverage \
-		$(VENV)/bin/python -m pytest -o cache_dir=$(WORKSPACE)/build/pytest_cache \
-		--cov --cov-report=term $(PYTEST_ARGS)
+		$(PYTEST) --cov --cov-report=term $(PYTEST_ARGS)
 
 benchmark: build
 	@$(IN_WORKSPACE) $(VENV)/bin/python -m benchmark $(BENCHMARK_ARGS) benchmark.json

@@ -141,7 +141,8 @@ def test_sets_that_fit_badly_on_the_coarse_grid_are_not_lost():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', [pytest.param(7501, marks=pytest.mark.long), 7509])
+@pytest.mark.long
+@pytest.mark.parametrize('seed', [7501, 7509])
 def test_two_effects_that_stand_for_each_other_are_not_both_left_out(seed):
     """
     A softer martensite and a strain that grows with the load fit this wire alike.
@@ -156,6 +157,7 @@ def test_two_effects_that_stand_for_each_other_are_not_both_left_out(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_what_makes_the_growth_with_the_load_undetermined_goes_instead_of_the_growth(monkeypatch):
     """Without the growth the left-out loads are missed three times as far."""
     squares = np.square(sequences.damped_oscillation())

@@ -132,6 +132,7 @@ def test_outputs_without_muscle_and_probabilities_can_still_be_rendered(scores):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_grid_runs_in_processes_of_its_own(root, tmp_path):
     written = tmp_path / 'hidden.json'
     ran = subprocess.run(

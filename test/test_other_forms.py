@@ -67,7 +67,7 @@ def test_creep_by_another_law_is_creep(monkeypatch, form):
     assert found.rmse_after < 0.5 * found.rmse_before
 
 
-@pytest.mark.parametrize('radiated', [0.0, 1.0])
+@pytest.mark.parametrize('radiated', [0.0, pytest.param(1.0, marks=pytest.mark.long)])
 def test_heat_lost_by_convection_or_radiation_alone_is_heat_loss(monkeypatch, radiated):
     monkeypatch.setattr(still_air, 'RADIATED', radiated)
     found = found_in({'heat_loss': 1.0}, 5, trials=(0, 1))

@@ -118,7 +118,8 @@ def test_it_is_named_where_the_moduli_differ_and_no_growth_of_the_strain(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', [3, pytest.param(4, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('seed', [3, 4])
 def test_it_is_not_named_where_the_moduli_are_equal(seed):
     _, (model, added) = bench_of((30e9, 30e9), seed)
     names = {effect.id for effect in added}

@@ -151,6 +151,7 @@ def test_slopes_that_differ_are_named_on_the_bench_and_no_r_phase():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_where_loads_left_out_tell_little_the_rows_fitted_decide():
     """Without slopes C followed the strain, and loads left out were predicted as well."""
     _, added = add_effects(*clean_bench(7403, 'lagoudas'), **TRIALS)
