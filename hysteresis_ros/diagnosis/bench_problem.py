@@ -29,6 +29,7 @@ from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.kernels.shares import shares
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.operators import Preisach, cell_areas
+from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
     from hysteresis_ros.identification.weight_fit import WeightFit
@@ -471,13 +472,12 @@ class BenchProblem(Problem):
         What the effects explain no longer has to be smoothed over, so that the grid may be finer
         where held-out rows say so.
         """
-        best: tuple[WeightFit, Design] | None = None
-        for factor in FINER:
-            fit, design = self.fit_stage(effects, round(factor * self._levels_of_model))
-            if best is None or fit.held_out_rmse < (1.0 - WORTH) * best[0].held_out_rmse:
-                best = fit, design
-        assert best is not None     # there is at least one factor
-        fit, design = best
+        (fit, design), *finer = map_in_forks(
+            lambda factor: self.fit_stage(effects, round(factor * self._levels_of_model)),
+            FINER, self.jobs)
+        for other in finer:
+            if other[0].held_out_rmse < (1.0 - WORTH) * fit.held_out_rmse:
+                fit, design = other
         stage = _stage(design.nodes, fit.weights, fit.bias)
         metrics = dict(self.model.metrics)
         metrics['length'] = {**metrics.get('length', {}), **left_out(

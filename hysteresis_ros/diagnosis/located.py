@@ -78,7 +78,8 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
         return None
     between = np.sqrt(values[best - 1:best + 1] * values[best:best + 2])
     values = np.insert(values, [best, best + 1], between)
-    errors = np.insert(errors, [best, best + 1], [error_at(value) for value in between.tolist()])
+    errors = np.insert(errors, [best, best + 1], map_in_forks(
+        error_at, between.tolist(), fitter.problem.jobs))
     # Between the values that were tried the logarithm of the error is a line.
     fine = np.linspace(np.log(values[0]), np.log(values[-1]), POSTERIOR)
     density = -len(np.unique(fitter.problem.block)) * np.interp(
