@@ -18,6 +18,7 @@ from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.linearised import Linearised, linearised_starts
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.effects import catalogue
 from hysteresis_ros.measurements import Measurement
 
 TRIED = ('payload_error', 'encoder_offset', 'supply_sag', 'frame_tilt')
@@ -308,6 +309,25 @@ def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
     assert found.sets.valid()[0] == {'airflow', 'payload_error'}
     found._exchange()
     assert found.sets.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
+
+
+def test_a_further_effect_that_only_led_out_of_a_local_minimum_is_no_answer(model):
+    """What is left without it is fitted from where it ended, once."""
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+    single = frozenset(['payload_error'])
+    offset = catalogue()['encoder_offset'](model.surroundings)
+    least = 1.01 * next(one.low for one in offset.parameters if one.name == 'offset')
+    pair, = found.fitter.fit([[*found.sets.fits[single].effects,
+                               offset.with_values(offset=least)]], found._metric(), 0)
+    stuck, = found.fitter.fit([[effect_of(model, 'payload_error', dm=1.0)]], found._metric(), 0)
+    found.sets.fits = {frozenset(): found.sets.base, frozenset(pair.names): pair, single: stuck}
+    found.sets.keep_least(single, stuck.predicted)
+    assert found.sets.valid()[0] == {'payload_error', 'encoder_offset'}
+    found._refine_best()
+    assert found.sets.valid()[0] == single
+    assert found.sets.fits[single].effects[0].dm == pytest.approx(15.0, abs=1.0)
+    # Nothing is left that a larger set would begin better.
+    assert found._worth_fitting_without(frozenset(pair.names)) == []
 
 
 def test_what_is_not_physical_is_exchanged_for_what_it_stands_for(monkeypatch):

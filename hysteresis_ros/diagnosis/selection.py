@@ -85,6 +85,8 @@ class Selection:
         self._grown: set[frozenset[str]] = set()
         self._refined: set[frozenset[str]] = set()
         self._exchanged: set[frozenset[str]] = set()
+        # Sets with those of one effect fewer that were begun where they ended.
+        self._reduced: set[tuple[frozenset[str], frozenset[str]]] = set()
         # Each with the response that it belongs to.
         self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
         self.alone: Linearised
@@ -377,17 +379,32 @@ class Selection:
         self.sets.judge_all()
 
     def _refine_best(self) -> None:
-        """Fit what remains of the most probable sets without any one of their effects."""
+        """
+        Fit what remains of the most probable sets without any one of their effects.
+
+        Again, where it has less error at once than its own fit: that has ended in a local minimum,
+        out of which the further effect has led, whether it acts or not.
+        """
         for _ in range(self.settings.most_effects):
-            valid = self.sets.valid()
-            if not valid:
+            starts = [effects for names in self.sets.valid()[:self.settings.beam]
+                      for effects in self._worth_fitting_without(names)]
+            if not starts:
                 return
-            missing = [names for one in valid[:self.settings.beam] for names in subsets(one)
-                       if names not in self.sets.fits]
-            if not missing:
-                return
-            self._fit([[effect for effect in self.sets.fits[one].effects if effect.id in names]
-                       for names in missing for one in valid if names < one][:len(missing)])
+            self._fit(starts)
+
+    def _worth_fitting_without(self, names: frozenset[str]) -> list[list[Effect]]:
+        """Return what a set holds without any one effect, where that is to be fitted from there."""
+        fit, starts = self.sets.fits[names], []
+        for fewer in filter(None, subsets(names)):
+            effects = [effect for effect in fit.effects if effect.id in fewer]
+            if fewer in self.sets.fits:
+                predicted, = self.fitter.simulate([effects])
+                if ((names, fewer) in self._reduced
+                        or not self.fitter.error(predicted) < self.sets.error(fewer)):
+                    continue
+                self._reduced.add((names, fewer))
+            starts.append(effects)
+        return starts
 
     def _ranked_of(self, size: int) -> list[frozenset[str]]:
         return [names for names in self.sets.ranked() if len(names) == size][:self.settings.beam]
