@@ -397,12 +397,13 @@ class Selection:
         fit, starts = self.sets.fits[names], []
         for fewer in filter(None, subsets(names)):
             effects = [effect for effect in fit.effects if effect.id in fewer]
+            if (names, fewer) in self._reduced:
+                continue
             if fewer in self.sets.fits:
                 predicted, = self.fitter.simulate([effects])
-                if ((names, fewer) in self._reduced
-                        or not self.fitter.error(predicted) < self.sets.error(fewer)):
+                if not self.fitter.error(predicted) < self.sets.error(fewer):
                     continue
-                self._reduced.add((names, fewer))
+            self._reduced.add((names, fewer))
             starts.append(effects)
         return starts
 
