@@ -84,11 +84,11 @@ class InstallData(install_data):
                     COMMAND.format(package=PACKAGE, name='hysteresis'))
 
     def _compile(self):
-        """Fill the cache of compiled functions, so that no node waits for it at its first start."""
+        """Fill the cache of compiled functions, so that no first call waits for the compiler."""
         installed = self.get_finalized_command('install').install_lib
         path = os.pathsep.join(filter(None, [installed, os.environ.get('PYTHONPATH')]))
         # What is not compiled now is compiled when it is first needed.
-        subprocess.run([sys.executable, '-m', f'{PACKAGE}.kernels.warm_up'], check=False,
+        subprocess.run([sys.executable, '-m', f'{PACKAGE}.compile_kernels'], check=False,
                        env={**os.environ, 'PYTHONPATH': path}, cwd=installed,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 

@@ -3,6 +3,7 @@
 """What is imported and compiled at the start, so that it is not in a control loop."""
 
 import math
+import os
 import subprocess
 import sys
 
@@ -114,6 +115,44 @@ def test_after_warming_up_nothing_is_compiled_in_a_loop(compilations, effects):
         controller.hold(0.1 * step + 0.05)
         observer.step(0.1 * step, setpoint.voltage, math.nan)
     assert compilations == []
+
+
+COMMANDS = """
+from numba.core.dispatcher import Dispatcher
+import numpy as np
+from hysteresis_ros import diagnose, extend, identify
+from hysteresis_ros.compile_kernels import compile_kernels
+from hysteresis_ros.laboratory.experiments import experiment_tables
+from model_support import bicep_model, runs
+
+compile_kernels()
+compile_for = Dispatcher._compile_for_args
+
+def watched(self, *args, **kwargs):
+    print('compiled', self.py_func.__module__, self.py_func.__name__)
+    return compile_for(self, *args, **kwargs)
+
+Dispatcher._compile_for_args = watched
+length, force = experiment_tables('bench', seed=4).values()
+length, force = length if 'length' in length else force, force if 'length' in length else length
+identify(length, force, length_trials=[0, 2], effects=['stress_dependent_strain'])
+identify({name: values[:40] for name, values in length.items()}, operator='bouc-wen')
+effects = ['thermal_lag', 'latent_heat', 'creep', 'inertia', 'wire_break', 'coulomb_friction']
+moving = runs(bicep_model(['thermal_lag']), trials=2, rows=50, dt=0.4)
+print(diagnose(bicep_model(), moving, effects, jobs=1))
+print(extend(bicep_model(), ['creep'], moving))
+"""
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason='nothing is compiled')
+def test_after_an_installation_nothing_is_compiled_by_a_command(root):
+    """A user who identifies for the first time does not wait for the compiler."""
+    path = os.pathsep.join((str(root), str(root / 'test'), os.environ.get('PYTHONPATH', '')))
+    found = subprocess.run([sys.executable, '-c', COMMANDS], capture_output=True, text=True,
+                           env={**os.environ, 'PYTHONPATH': path}, check=False)
+    assert found.returncode == 0, found.stderr
+    assert 'thermal_lag' in found.stdout
+    assert [line for line in found.stdout.splitlines() if line.startswith('compiled')] == []
 
 
 def test_warming_up_leaves_the_model_as_it_is():

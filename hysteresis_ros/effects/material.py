@@ -360,8 +360,7 @@ class Creep(MaterialEffect):
         modes = np.array(self._modes)
         # Where the phase is not known, nothing relaxes.
         targets = np.where(np.isfinite(inputs.phase), inputs.phase - 1.0, np.nan)
-        dt = np.ascontiguousarray(inputs.dt, float)
-        total = relax(targets, dt, self._times(), modes)
+        total = relax(targets, np.array(inputs.dt, float), self._times(), modes)
         self._modes = modes.tolist()
         return self._strain_of_modes(total, surroundings)
 

@@ -75,6 +75,6 @@ class ViscoelasticCreep(MaterialEffect):
         elements = np.array(self._elements)
         # With these times the sum comes to the logarithm in the long run.
         times = self.t0 * RATIO ** np.arange(1.0, ELEMENTS + 1.0)
-        total = relax(shares, np.ascontiguousarray(dt, float), times, elements)
+        total = relax(shares, np.array(dt, float), times, elements)
         self._elements = elements.tolist()
         return self.J / 100.0 * surroundings.length * math.log(RATIO) * total

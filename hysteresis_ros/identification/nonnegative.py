@@ -57,7 +57,9 @@ def solve_nonnegative(
         When `gram` is not positive definite or no solution is found.
     """
     passive = free.copy() if start is None else (start | free)
-    x, state = pivot(gram, moment, free, passive,
+    # Symmetric: its rows are its columns. One layout is one function to compile.
+    rows = np.ascontiguousarray(gram.T if gram.flags.f_contiguous else gram)
+    x, state = pivot(rows, moment, free, passive,
                      TOLERANCE * max(float(np.max(np.abs(moment))), 1e-300), ROUNDING)
     if state == SINGULAR:
         raise IdentificationError(NO_SOLUTION)

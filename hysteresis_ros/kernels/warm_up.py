@@ -11,7 +11,6 @@ installation, `python -m hysteresis_ros.kernels.warm_up` fills the cache.
 from __future__ import annotations
 
 import contextlib
-import logging
 import math
 import time
 from typing import TYPE_CHECKING
@@ -92,7 +91,7 @@ def small_model() -> MuscleModel:
         force_stage=Preisach(np.linspace(0.0, 6.0, 5), cells * 14.0 / 36.0, 7.5),
         length_stage=Preisach(np.linspace(-10.0, 6.0, 5), cells * (high - low) / 256.0,
                               0.5 * (low + high)),
-        geometry=geometry,
+        geometry=geometry, mean_load=4.0,
         ranges={'voltage': (0.0, 6.0), 'force': (0.5, 14.5), 'length': (low, high)})
 
 
@@ -111,8 +110,3 @@ def _reference(model: MuscleModel, controller: Controller,
 def _within(limits: tuple[float, float], share: float) -> float:
     low, high = limits
     return float(low + share * (high - low))
-
-
-if __name__ == '__main__':
-    logging.basicConfig(format='%(message)s', level=logging.INFO)
-    logging.info('kernels ready in %.1f s', warm_up())
