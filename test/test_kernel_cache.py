@@ -78,6 +78,20 @@ def test_a_second_start_compiles_nothing(package, home):
     assert list((home[0] / '.cache' / 'hysteresis_ros').glob('kernels-*/*/outer*.nbi'))
 
 
+def test_what_is_compiled_already_runs_without_what_compiles(package, home):
+    """Its imports would be a fifth of the time that a command takes; later they are made up for."""
+    code = """
+import sys
+from hysteresis_ros.kernels.outer import outer
+print(outer(2.0), 'numba.np.npyimpl' in sys.modules)
+print(outer(2), 'numba.np.npyimpl' in sys.modules)
+"""
+    assert finished(start(package, code)) == ['5.0', 'True', '5', 'True']
+    assert finished(start(package, code)) == ['5.0', 'False', '5', 'False']
+    code = code.replace('outer(2)', 'outer(2 + 0j)')
+    assert finished(start(package, code)) == ['5.0', 'False', '(5+0j)', 'True']
+
+
 def test_a_change_in_a_called_function_is_seen(package, home):
     """Numba alone compares the file of the outer function only."""
     finished(start(package))

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numba
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime import rtsys
 from numba.extending import typeof_impl
 import numpy as np
 
@@ -88,7 +89,10 @@ class KernelCache(FunctionCache):
         """Return the compiled function for a signature, or None if it is not there."""
         try:
             with self._locked(exclusive=False):
-                return super().load_overload(sig, target_context)
+                # Numba's own imports all that it compiles with first, a quarter of a second for
+                # nothing: what is compiled already needs the functions that count references.
+                rtsys.initialize(target_context)
+                return self._load_overload(sig, target_context)
         except Exception as error:      # whatever pickle makes of a damaged file
             self._report('read', error)
             self._forget()
