@@ -220,12 +220,12 @@ class FittedSets:
         Return the sets that may be the answer, most probable first.
 
         All values are physical, and each effect matters: without it the error is larger by a
-        practical size and by more than the expected error of the base model, and if others stay,
-        it is larger than the base model's own error could be, or these are clearly less probable.
-        A single effect of less than that error has to be clearly more probable than none, by a
-        course that the error has not. It also has to explain more than the best of all would by
-        chance; and no set of as few effects has a smaller residual, by more than the base model's
-        error and that of an effect's equation could be.
+        practical size, and either by more than the expected error of the base model or the set is
+        clearly less probable, as its residual has a course that this error has not. If others
+        stay, without it the error is larger than the base model's own could be, or these are
+        clearly less probable. A single effect also has to explain more than the best of all would
+        by chance; and no set of as few effects has a smaller residual, by more than the base
+        model's error and that of an effect's equation could be.
         """
         physical = [names for names in self.ranked() if not self.fits[names].implausible()]
         return [names for names in physical if self._each_matters(names)
@@ -242,8 +242,8 @@ class FittedSets:
                         LEAST_SHARE * self.own_error(frozenset()))
             if before - error < least or (without and self._would_do(without, names)):
                 return False
-            if before ** 2 - error ** 2 < self.covariance.size ** 2 and (
-                    without or not self._clearly_more_probable(names, without)):
+            if (before ** 2 - error ** 2 < self.covariance.size ** 2
+                    and not self._clearly_more_probable(names, without)):
                 return False
         return True
 
