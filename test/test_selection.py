@@ -15,7 +15,8 @@ from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, sensitivity
 from hysteresis_ros.diagnosis.kind import problem_for
-from hysteresis_ros.diagnosis.linearised import Linearised, linearised_starts
+from hysteresis_ros.diagnosis.linearised import (
+    Linearised, linearised_starts, singles_as_started)
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue
@@ -282,13 +283,24 @@ def test_what_suffices_alone_grows_alone(payload, monkeypatch):
     monkeypatch.setattr(payload.covariance, 'size', 0.0)
     assert payload._worth_growing(1) == payload._ranked_of(1)
     assert payload._worth_growing(2) == []
-    monkeypatch.setattr(payload.sets, 'valid', lambda: [pair, small])
+    for ranks in ('valid', 'ranked'):
+        monkeypatch.setattr(payload.sets, ranks, lambda: [pair, small])
     monkeypatch.setitem(payload.sets.fits, pair, payload.sets.fits[small])
     assert payload._worth_growing(2) == [pair]
     monkeypatch.setattr(payload, '_promising', lambda names: False)
     assert payload._worth_growing(2) == []
     monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: 2.0 * payload.sets.rmse_95)
     assert payload._worth_growing(2) == payload._ranked_of(2)
+
+
+def test_sets_grow_on_where_what_cannot_be_the_answer_is_more_probable(payload, monkeypatch):
+    """It stands for something that a larger set may name."""
+    assert payload._worth_growing(1) == []
+    order = payload.sets.ranked()
+    other = next(names for names in order if len(names) == 1 and names != {'payload_error'})
+    monkeypatch.setattr(payload.sets, 'ranked', lambda: [other, *order])
+    monkeypatch.setattr(payload.sets, 'valid', lambda: [frozenset(['payload_error'])])
+    assert payload._worth_growing(1) == payload._ranked_of(1) != []
 
 
 PLANTED = frozenset(['payload_error', 'supply_sag'])
@@ -309,6 +321,19 @@ def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
     assert found.sets.valid()[0] == {'airflow', 'payload_error'}
     found._exchange()
     assert found.sets.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
+
+
+def test_of_what_changes_much_the_start_that_is_nearest_is_tried(model):
+    """Where the wire hardly transforms any more, no derivative says what a larger value does."""
+    hidden = [effect_of(model, 'pwm_dead_zone', Vd=1.2), effect_of(model, 'supply_sag', Rs=0.9)]
+    found = selection(model, recording(model, hidden), ['pwm_dead_zone', *TRIED])
+    kept, = found.fitter.fit([hidden[:1]], found._metric(), 0)
+    scored = singles_as_started(found.fitter, kept, ['supply_sag', 'payload_error'])
+    error, (start,) = scored['supply_sag',]
+    assert start.Rs == 1.0
+    assert -error == pytest.approx(found.fitter.error(found.fitter.simulate([[*kept.effects,
+                                                                            start]])[0]))
+    assert error > scored['payload_error',][0]
 
 
 def test_a_further_effect_that_only_led_out_of_a_local_minimum_is_no_answer(model):

@@ -79,22 +79,12 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
         Those whose simulation is finite.
     """
     problem, found = fitter.problem, []
-    own = {effect.id: effect for effect in fitter.fixed}
-    starts: list[Effect] = []
-    usual: set[tuple] = set()
-    for name in names:
-        effect = present(problem.model, catalogue()[name])
-        starts += starts_of(effect, problem.kind, problem.measured,
-                            residual=problem.measured - fit.predicted, clock=problem.own_clock)
-        usual.update(map(_key, starts_of(effect, problem.kind)))
-        if name in own:
-            # What the bench says of it is as good a start as any.
-            starts.append(own[name])
-    walks = [_Moves(start, fit.effects, problem.kind) for start in starts]
     # What is moved a little takes up the phase of where it is moved from.
-    responses = fitter.simulate([walk.at for walk in walks])
+    walks, responses = _started(fitter, fit, names)
     if point is not None:
         # What the response or the residual suggests is always looked at.
+        usual = {_key(start) for name in names for start in starts_of(
+            present(problem.model, catalogue()[name]), problem.kind)}
         known = {_key(start.effect): start.columns for start in earlier
                  if _key(start.effect) in usual}
         kept = _promising(walks, responses - fit.predicted, problem.measured - fit.predicted,
@@ -109,6 +99,61 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
         mean, spread = walk.parameters.prior()
         found.append(Start(walk.start, response - fit.predicted + jacobian @ (
             mean - walk.vector), jacobian * spread))
+    return found
+
+
+def singles_as_started(fitter: Fitter, fit: Fit, names: Sequence[str]
+                       ) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
+    """
+    Score effects by the errors that they leave with the values of their starts, as they are.
+
+    What changes much may bend the response so that no linearisation comes near it, and leaves a
+    residual of which no covariance knows.
+
+    Parameters
+    ----------
+    fitter : Fitter
+    fit : Fit
+        Its effects keep their values.
+    names : sequence of str
+        Effects to score.
+
+    Returns
+    -------
+    dict of tuple of str to (float, list of Effect)
+        By the name of the effect minus its least RMSE, in the unit of the response, and the start
+        that reaches it, of those whose simulation is finite.
+    """
+    walks, responses = _started(fitter, fit, names)
+    finite = [index for index, own in enumerate(responses) if np.all(np.isfinite(own))]
+    return _largest([walks[index].start for index in finite],
+                    np.array([-fitter.error(responses[index]) for index in finite]))
+
+
+def _started(fitter: Fitter, fit: Fit, names: Sequence[str]
+             ) -> tuple[list[_Moves], np.ndarray]:
+    """Return all starts of effects together with those of a fit, and the responses there."""
+    problem = fitter.problem
+    own = {effect.id: effect for effect in fitter.fixed}
+    starts: list[Effect] = []
+    for name in names:
+        starts += starts_of(present(problem.model, catalogue()[name]), problem.kind,
+                            problem.measured, residual=problem.measured - fit.predicted,
+                            clock=problem.own_clock)
+        if name in own:
+            # What the bench says of it is as good a start as any.
+            starts.append(own[name])
+    walks = [_Moves(start, fit.effects, problem.kind) for start in starts]
+    return walks, fitter.simulate([walk.at for walk in walks])
+
+
+def _largest(starts: Sequence[Effect], values: np.ndarray
+             ) -> dict[tuple[str, ...], tuple[float, list[Effect]]]:
+    """Return the largest value of each effect by its name, with the start that has it."""
+    found: dict[tuple[str, ...], tuple[float, list[Effect]]] = {}
+    for start, value in zip(starts, values):
+        if (start.id,) not in found or value > found[start.id,][0]:
+            found[start.id,] = (float(value), [start])
     return found
 
 
@@ -256,12 +301,8 @@ class Linearised:
         dict of tuple of str to (float, list of Effect)
             By the name of the effect its largest log evidence, and the start that reaches it.
         """
-        values = self.evidences(np.arange(len(self.starts))[:, None])
-        found: dict[tuple[str, ...], tuple[float, list[Effect]]] = {}
-        for start, value in zip(self.starts, values):
-            if (start.id,) not in found or value > found[start.id,][0]:
-                found[start.id,] = (float(value), [start.effect])
-        return found
+        return _largest([start.effect for start in self.starts],
+                        self.evidences(np.arange(len(self.starts))[:, None]))
 
     def indices_of_best(self) -> dict[str, list[int]]:
         """Return the indices of the best few starts of each effect, the best first."""

@@ -22,7 +22,8 @@ from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance, Point
 from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, room_is_calm
 from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
-from hysteresis_ros.diagnosis.linearised import Linearised, Start, linearised_starts
+from hysteresis_ros.diagnosis.linearised import (
+    Linearised, linearised_starts, singles_as_started, Start)
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 from hysteresis_ros.effects import Effect
@@ -165,12 +166,14 @@ class Selection:
         """
         Return the sets of a size that are worth one more effect.
 
-        The most probable ones, if the best set's residual is too large. If it is not, but a further
-        effect explains some of it: all of these single effects, and of larger sets the best alone.
+        The most probable ones, if the best set's residual is too large, or what cannot be the
+        answer is more probable, and stands for it. If not, but a further effect explains some of
+        the residual: all of these single effects, and of larger sets the best alone.
         """
         valid = self.sets.valid()
         best = next(filter(self.sets.sufficient, valid), valid[0] if valid else None)
-        if best is None or self.sets.noise_free_rmse(best) > self.sets.rmse_95:
+        if best is None or self.sets.noise_free_rmse(best) > self.sets.rmse_95 or (
+                best and best != self.sets.ranked()[0]):
             return self._ranked_of(size)
         # What a further effect explains has to exceed the base model's own error.
         if (not best or self.sets.own_error(best) <= self.covariance.size
@@ -244,8 +247,7 @@ class Selection:
 
     def _linearised_at(self, fit: Fit) -> Linearised:
         """Return all other effects, linearised at the values of a fit."""
-        taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
-        others = [name for name in self.names if name not in taken]
+        others = self._others(fit)
         _, spread = ParameterVector(fit.effects, self.problem.kind).prior()
         residual = self.problem.measured - fit.predicted
         if not fit.effects:
@@ -255,6 +257,11 @@ class Selection:
         starts = linearised_starts(self.fitter, fit, others, self.alone.starts, own)
         return Linearised([own] if fit.covariance else self.covariance.points, residual, starts,
                           fit.jacobian * spread)
+
+    def _others(self, fit: Fit) -> list[str]:
+        """Return the names of the effects that can act beside those of a fit."""
+        taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
+        return [name for name in self.names if name not in taken]
 
     def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
         """Fit the best sets of those scored."""
@@ -304,7 +311,9 @@ class Selection:
         Exchange single effects of the answer for others, until no other set is more probable.
 
         The other effects start at their values in the answer. Where a set is grown from a smaller
-        one they start at their values in that, which may be far away.
+        one they start at their values in that, which may be far away. What takes the place of an
+        effect that changes much has to change as much, which no linearisation shows: starts are
+        tried as they are, too.
         """
         for _ in range(self.settings.most_effects):
             names, exchanged = self._to_exchange()
@@ -314,16 +323,23 @@ class Selection:
             whole = self.sets.fits[names]
             for out in exchanged:
                 kept = [effect for effect in whole.effects if effect.id != out]
-                for rest in self.fitter.fit([kept], self._metric(), 0):
-                    scored = self._linearised_at(dataclasses.replace(
-                        rest, covariance=whole.covariance, values=whole.values)).singles()
-                    scored.pop((out,), None)
-                    order = sorted(scored.values(), key=lambda item: -item[0])
-                    self._fit([
-                        [*(one for one in kept if one.id not in effects[0].replaces), *effects]
-                        for _, effects in order[:self.settings.refits]])
+                for fit in self.fitter.fit([kept], self._metric(), 0):
+                    rest = dataclasses.replace(
+                        fit, covariance=whole.covariance, values=whole.values)
+                    self._fit(self._best_with(kept, self._linearised_at(rest).singles(), out))
+                    started = singles_as_started(self.fitter, rest, self._others(rest))
+                    self._begin(self._best_with(kept, started, out), 1)
             self._refine(len(names))
             self._refine_best()
+
+    def _best_with(self, kept: Sequence[Effect],
+                   scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
+                   ) -> list[list[Effect]]:
+        """Return what is kept with each of the best effects scored, but for the one named."""
+        order = sorted((item for key, item in scored.items() if key != (out,)),
+                       key=lambda item: -item[0])
+        return [[*(one for one in kept if one.id not in effects[0].replaces), *effects]
+                for _, effects in order[:self.settings.refits]]
 
     def _to_exchange(self) -> tuple[frozenset[str], list[str]]:
         """
