@@ -48,6 +48,8 @@ LONG = ('test_fault_on_the_machine_code', 'test_a_pulled_cable_of_the_machine_co
         'test_a_sine_as_a_trajectory_is_as_good_as_angle_by_angle',
         'test_commands_warn_of_loads_beyond_the_bench',
         'test_growth_of_another_form_has_the_right_name',
+        'test_sets_that_fit_badly_on_the_coarse_grid_are_not_lost',
+        'test_intervals_under_noise_that_lasts_hold_the_truth_as_often_as_they_say',
         'test_the_recording_gives_the_same_answer',
         'test_the_notebook_goes_from_the_bench_to_the_extended_model')
 

@@ -378,20 +378,6 @@ def test_an_effect_has_to_matter_by_a_practical_size(model):
     assert planted not in found.sets.valid()
 
 
-@pytest.mark.parametrize(('name', 'values', 'named'), [
-    ('backlash', {'B': 2.0}, True), ('coulomb_friction', {'tau_c': 0.02}, True),
-    ('payload_error', {'dm': 5.0}, False)])
-def test_an_effect_within_the_models_own_error_needs_a_course_of_its_own(model, name, values,
-                                                                         named):
-    """A play turns with the drive, as no error of the operators does; a payload could be one."""
-    found = selection(model, recording(model, [effect_of(model, name, **values)]),
-                      ('payload_error', 'encoder_offset', 'backlash', 'coulomb_friction'))
-    before, after = (found.sets.own_error(names) for names in (frozenset(), frozenset([name])))
-    assert 0.0 < before ** 2 - after ** 2 < 1.5 * found.covariance.size ** 2
-    assert found.sets.sufficient(frozenset())
-    assert (found.sets.valid()[0] == {name}) == named
-
-
 def test_an_implausible_set_is_no_answer_however_well_it_explains(model):
     """A payload that is too heavy by more than its range is something else."""
     far = effect_of(model, 'payload_error', dm=15.0)
