@@ -30,7 +30,7 @@ LEVELS = 4, 6
 
 def compile_kernels() -> float:
     """
-    Control, observe, simulate, identify and diagnose with a small model; return how long it took.
+    Control, observe, simulate and identify with a small model; return how long it took.
 
     Returns
     -------
