@@ -259,7 +259,7 @@ class Selection:
                           fit.jacobian * spread)
 
     def _others(self, fit: Fit) -> list[str]:
-        """Return the names of the effects that can act beside those of a fit."""
+        """Return the names of the effects that can act together with those of a fit."""
         taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
         return [name for name in self.names if name not in taken]
 
