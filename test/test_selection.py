@@ -315,10 +315,16 @@ def without_the_planted_pair():
     return found, found.sets.fits.pop(PLANTED).log_evidence
 
 
-def test_one_effect_of_the_answer_is_exchanged_for_a_better_one():
-    """A fan is a sag to an arm at rest; in its place the sag itself is found."""
+@pytest.mark.parametrize('fails', ['linearised', 'as started'])
+def test_one_effect_of_the_answer_is_exchanged_for_a_better_one(monkeypatch, fails):
+    """A fan is a sag to an arm at rest; in its place the sag is found, by either score."""
     found, before = without_the_planted_pair()
     assert found.sets.valid()[0] == {'airflow', 'payload_error'}
+    if fails == 'linearised':
+        monkeypatch.setattr(Linearised, 'singles', lambda linearised: {})
+    else:
+        monkeypatch.setattr('hysteresis_ros.diagnosis.selection.singles_as_started',
+                            lambda fitter, fit, names: {})
     found._exchange()
     assert found.sets.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
 
@@ -376,6 +382,20 @@ def test_an_effect_has_to_matter_by_a_practical_size(model):
     assert 0.1 < gain < 0.99
     found.sets.settings = dataclasses.replace(found.settings, practical=gain + 0.01)
     assert planted not in found.sets.valid()
+
+
+@pytest.mark.parametrize(('name', 'values', 'named'), [
+    ('backlash', {'B': 2.0}, True), ('coulomb_friction', {'tau_c': 0.015}, False),
+    ('payload_error', {'dm': 5.0}, False)])
+def test_an_effect_within_the_models_own_error_needs_a_memory_of_its_own(model, name, values,
+                                                                         named):
+    """What the model gets wrong repeats itself with the drive, as friction and a payload do."""
+    found = selection(model, recording(model, [effect_of(model, name, **values)]),
+                      ('payload_error', 'encoder_offset', 'backlash', 'coulomb_friction'))
+    before, after = (found.sets.own_error(names) for names in (frozenset(), frozenset([name])))
+    assert 0.0 < before ** 2 - after ** 2 < found.covariance.size ** 2
+    assert found.sets.sufficient(frozenset())
+    assert (found.sets.valid()[0] == {name}) == named
 
 
 def test_an_implausible_set_is_no_answer_however_well_it_explains(model):

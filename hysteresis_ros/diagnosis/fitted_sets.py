@@ -220,11 +220,12 @@ class FittedSets:
         Return the sets that may be the answer, most probable first.
 
         All values are physical, and each effect matters: without it the error is larger by a
-        practical size and by more than the expected error of the base model, and if others stay,
-        it is larger than the base model's own error could be, or these are clearly less probable.
-        A single effect also has to explain more than the best of all would by chance; and no set
-        of as few effects has a smaller residual, by more than the base model's error and that of an
-        effect's equation could be.
+        practical size, and by more than the expected error of the base model; or, as that repeats
+        itself with the drive, it remembers something of its own, and the set is clearly less
+        probable without it. If others stay, without it the error is larger than the base model's
+        own could be, or these are clearly less probable. A single effect also has to explain more
+        than the best of all would by chance; and no set of as few effects has a smaller residual,
+        by more than the base model's error and that of an effect's equation could be.
         """
         physical = [names for names in self.ranked() if not self.fits[names].implausible()]
         return [names for names in physical if self._each_matters(names)
@@ -239,10 +240,17 @@ class FittedSets:
             before = self.own_error(without)
             least = max(self.settings.practical * before,
                         LEAST_SHARE * self.own_error(frozenset()))
-            if (before - error < least or before ** 2 - error ** 2 < self.covariance.size ** 2
-                    or (without and self._would_do(without, names))):
+            if before - error < least or (without and self._would_do(without, names)):
+                return False
+            if (before ** 2 - error ** 2 < self.covariance.size ** 2
+                    and not (self._remembers(names - without)
+                             and self._clearly_more_probable(names, without))):
                 return False
         return True
+
+    def _remembers(self, names: frozenset[str]) -> bool:
+        """Whether effects have a memory of their own."""
+        return all(effect.memory for effect in self.fits[names].effects)
 
     def _surpassed(self, names: frozenset[str], others: Iterable[frozenset[str]]) -> bool:
         """Whether another set of as few effects predicts far better."""
@@ -260,10 +268,14 @@ class FittedSets:
         """
         if not self.sufficient(without) or self.fits[without].implausible():
             return False
-        odds = self.log_posterior(names) - self.log_posterior(without)
         if self.noise_free_rmse(without) > self.rmse_95 >= self.noise_free_rmse(names):
-            return odds < 0.0
-        return odds < -math.log(self.settings.reported)
+            return self.log_posterior(names) < self.log_posterior(without)
+        return not self._clearly_more_probable(names, without)
+
+    def _clearly_more_probable(self, names: frozenset[str], without: frozenset[str]) -> bool:
+        """Whether a smaller set is so much less probable that it would not be reported."""
+        odds = self.log_posterior(names) - self.log_posterior(without)
+        return odds >= -math.log(self.settings.reported)
 
 
 def _rms(residual: np.ndarray) -> float:
