@@ -26,7 +26,8 @@ CASES = {
     # An arm whose ringing nothing damps makes any difference larger, swing by swing.
     'inertia': (MOVING, {'inertia': {'I': 0.002, 'b': 0.05}}),
 }
-ROWS, REPEATS = 3000, 5
+# As many rows as a moving recording has, so that what a call takes besides counts as it does there.
+ROWS, REPEATS = 12000, 5
 QUICK_ROWS, QUICK_REPEATS = 200, 2
 SETPOINTS, QUICK_SETPOINTS = 20000, 500
 

@@ -79,10 +79,10 @@ def test_only_the_best_single_effects_are_fitted_to_the_end(payload):
 def test_a_fit_that_is_better_from_the_least_squares_on_is_kept(model, monkeypatch):
     """Under a covariance the way to the maximum may be too rough."""
     found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
-    found._refined.clear()
+    found.fitting._refined.clear()
     monkeypatch.setattr(found.fitter, 'polished', lambda fit: dataclasses.replace(
         fit, log_evidence=1e6))
-    found._refine(1)
+    found.fitting.refine(1)
     assert found.sets.fits[frozenset(['payload_error'])].log_evidence == 1e6
 
 
@@ -257,7 +257,7 @@ def test_a_pair_that_is_stuck_is_fitted_from_all_starts(monkeypatch):
     found = selection(model, measured)
     good = found.sets.fits[names]
     stuck, = found.fitter.fit([[effect.with_values(**dict.fromkeys(effect.values, 1e-3))
-                                for effect in good.effects]], found._metric(), 0)
+                                for effect in good.effects]], found.fitting.metric, 0)
     assert stuck.log_evidence < good.log_evidence - 20.0
     monkeypatch.setitem(found.sets.fits, names, stuck)
     monkeypatch.setattr(found, 'settings', dataclasses.replace(found.settings, refits=6))
@@ -281,7 +281,7 @@ def test_what_suffices_alone_grows_alone(payload, monkeypatch):
     small, pair = frozenset(['payload_error']), frozenset(['payload_error', 'frame_tilt'])
     monkeypatch.setattr(payload, '_promising', lambda names: True)
     monkeypatch.setattr(payload.covariance, 'size', 0.0)
-    assert payload._worth_growing(1) == payload._ranked_of(1)
+    assert payload._worth_growing(1) == payload.sets.best_of(1)
     assert payload._worth_growing(2) == []
     for ranks in ('valid', 'ranked'):
         monkeypatch.setattr(payload.sets, ranks, lambda: [pair, small])
@@ -290,7 +290,7 @@ def test_what_suffices_alone_grows_alone(payload, monkeypatch):
     monkeypatch.setattr(payload, '_promising', lambda names: False)
     assert payload._worth_growing(2) == []
     monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: 2.0 * payload.sets.rmse_95)
-    assert payload._worth_growing(2) == payload._ranked_of(2)
+    assert payload._worth_growing(2) == payload.sets.best_of(2)
 
 
 def test_sets_grow_on_where_what_cannot_be_the_answer_is_more_probable(payload, monkeypatch):
@@ -300,7 +300,7 @@ def test_sets_grow_on_where_what_cannot_be_the_answer_is_more_probable(payload, 
     other = next(names for names in order if len(names) == 1 and names != {'payload_error'})
     monkeypatch.setattr(payload.sets, 'ranked', lambda: [other, *order])
     monkeypatch.setattr(payload.sets, 'valid', lambda: [frozenset(['payload_error'])])
-    assert payload._worth_growing(1) == payload._ranked_of(1) != []
+    assert payload._worth_growing(1) == payload.sets.best_of(1) != []
 
 
 PLANTED = frozenset(['payload_error', 'supply_sag'])
@@ -333,7 +333,7 @@ def test_of_what_changes_much_the_start_that_is_nearest_is_tried(model):
     """Where the wire hardly transforms any more, no derivative says what a larger value does."""
     hidden = [effect_of(model, 'pwm_dead_zone', Vd=1.2), effect_of(model, 'supply_sag', Rs=0.9)]
     found = selection(model, recording(model, hidden), ['pwm_dead_zone', *TRIED])
-    kept, = found.fitter.fit([hidden[:1]], found._metric(), 0)
+    kept, = found.fitter.fit([hidden[:1]], found.fitting.metric, 0)
     scored = singles_as_started(found.fitter, kept, ['supply_sag', 'payload_error'])
     error, (start,) = scored['supply_sag',]
     assert start.Rs == 1.0
@@ -349,16 +349,17 @@ def test_a_further_effect_that_only_led_out_of_a_local_minimum_is_no_answer(mode
     offset = catalogue()['encoder_offset'](model.surroundings)
     least = 1.01 * next(one.low for one in offset.parameters if one.name == 'offset')
     pair, = found.fitter.fit([[*found.sets.fits[single].effects,
-                               offset.with_values(offset=least)]], found._metric(), 0)
-    stuck, = found.fitter.fit([[effect_of(model, 'payload_error', dm=1.0)]], found._metric(), 0)
+                               offset.with_values(offset=least)]], found.fitting.metric, 0)
+    stuck, = found.fitter.fit([[effect_of(model, 'payload_error', dm=1.0)]], found.fitting.metric,
+                              0)
     found.sets.fits = {frozenset(): found.sets.base, frozenset(pair.names): pair, single: stuck}
     found.sets.keep_least(single, stuck.predicted)
     assert found.sets.valid()[0] == {'payload_error', 'encoder_offset'}
-    found._refine_best()
+    found.fitting.refine_best()
     assert found.sets.valid()[0] == single
     assert found.sets.fits[single].effects[0].dm == pytest.approx(15.0, abs=1.0)
     # Nothing is left that a larger set would begin better.
-    assert found._worth_fitting_without(frozenset(pair.names)) == []
+    assert found.fitting._worth_fitting_without(frozenset(pair.names)) == []
 
 
 def test_what_is_not_physical_is_exchanged_for_what_it_stands_for(monkeypatch):

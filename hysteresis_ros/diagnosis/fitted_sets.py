@@ -112,6 +112,10 @@ class FittedSets:
         """Return all sets that were fitted, most probable first."""
         return sorted(self.fits, key=lambda names: -self.log_posterior(names))
 
+    def best_of(self, size: int) -> list[frozenset[str]]:
+        """Return the most probable sets of so many effects: those that larger ones grow from."""
+        return [names for names in self.ranked() if len(names) == size][:self.settings.beam]
+
     def error(self, names: frozenset[str]) -> float:
         """
         Return the RMSE of a set on all judged rows, fitted by least squares.

@@ -19,15 +19,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
-from hysteresis_ros.diagnosis.covariance import Covariance, Point
+from hysteresis_ros.diagnosis.covariance import Covariance
 from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, room_is_calm
-from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
+from hysteresis_ros.diagnosis.fitted_sets import FittedSets
 from hysteresis_ros.diagnosis.linearised import (
     Linearised, linearised_starts, singles_as_started, Start)
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.diagnosis.set_fitter import BEGUN, FIRST_STEPS, SetFitter
 from hysteresis_ros.effects import Effect
-from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
 
 # Drift and noise of the first covariances, as shares of the discrepancy.
 FIRST_POINTS = ((0.1, 0.05), (0.4, 0.3), (1.5, 0.3), (6.0, 0.3))
-# Sets that are begun, for one that is fitted to the end, and steps of what is begun.
-BEGUN, FIRST_STEPS = 3, 3
 
 
 class Selection:
@@ -57,6 +55,7 @@ class Selection:
     ----------
     sets : FittedSets
         What was fitted, at first without any further effect.
+    fitting : SetFitter
     covariance : Covariance
         Of the base model's residuals.
     unobservable : dict of str to str
@@ -83,11 +82,9 @@ class Selection:
         self.sets = FittedSets(self.fitter, settings, rng)
         self.sets.keep(self.fitter.judge(
             Fit([], np.zeros(0), predicted, np.zeros((len(predicted), 0)))))
+        self.fitting = SetFitter(self.sets)
         self._grown: set[frozenset[str]] = set()
-        self._refined: set[frozenset[str]] = set()
         self._exchanged: set[frozenset[str]] = set()
-        # Sets with those of one effect fewer that were begun where they ended.
-        self._reduced: set[tuple[frozenset[str], frozenset[str]]] = set()
         # Each with the response that it belongs to.
         self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
         self.alone: Linearised
@@ -128,11 +125,11 @@ class Selection:
         which a fit goes astray.
         """
         starts = [[effect] for effect in self.alone.best_starts()]
-        for fit in self._begin(starts, BEGUN * self.settings.refits):
+        for fit in self.fitting.begin(starts, BEGUN * self.settings.refits):
             self.sets.keep(fit)
         self.sets.p_values = self._significance()
         self._grown.add(frozenset())
-        self._refine(1)
+        self.fitting.refine(1)
 
     def _grow_sets(self) -> None:
         """Grow sets, size by size, while the residual of the best one is too large."""
@@ -141,13 +138,13 @@ class Selection:
             if not grown_from:
                 break
             if size == 1:
-                self._fit_best(self.alone.pairs())
+                self.fitting.fit_best(self.alone.pairs())
             for names in grown_from:
                 self.grow(names)
-            self._refine(size + 1)
+            self.fitting.refine(size + 1)
             if size == 1 and not any(map(self.sets.sufficient, self.sets.valid())):
                 self._fit_from_all_starts(2)
-        self._refine_best()
+        self.fitting.refine_best()
         self._exchange()
 
     def _significance(self) -> dict[str, float]:
@@ -174,13 +171,13 @@ class Selection:
         best = next(filter(self.sets.sufficient, valid), valid[0] if valid else None)
         if best is None or self.sets.noise_free_rmse(best) > self.sets.rmse_95 or (
                 best and best != self.sets.ranked()[0]):
-            return self._ranked_of(size)
+            return self.sets.best_of(size)
         # What a further effect explains has to exceed the base model's own error.
         if (not best or self.sets.own_error(best) <= self.covariance.size
                 or not self._promising(best)):
             return []
         if size == 1:
-            return self._ranked_of(size)
+            return self.sets.best_of(size)
         return [best] if len(best) == size else []
 
     def _promising(self, names: frozenset[str]) -> bool:
@@ -197,7 +194,7 @@ class Selection:
         self._grown.add(names)
         fit = self.sets.fits[names]
         found = self._linearised_with(names).singles()
-        self._fit_best({key: (value, [
+        self.fitting.fit_best({key: (value, [
             *(one for one in fit.effects if one.id not in effects[0].replaces), *effects])
             for key, (value, effects) in found.items()})
 
@@ -222,10 +219,10 @@ class Selection:
         """
         others = [one for one in fit.effects if one.id not in effect.replaces]
         starts = [*self._starts_of(effect, fit), effect]
-        found = self.fitter.fit([[*others, start] for start in starts], self._metric(),
+        found = self.fitter.fit([[*others, start] for start in starts], self.fitting.metric,
                                 FIRST_STEPS, exact=False)
         found.sort(key=lambda one: -one.log_evidence)
-        found = self.fitter.fit([one.effects for one in found[:2]], self._metric())
+        found = self.fitter.fit([one.effects for one in found[:2]], self.fitting.metric)
         best = max(found, key=lambda one: one.log_evidence)
         values = self.fitter.covariance_values(best)
         self.covariance.add(values)
@@ -263,34 +260,6 @@ class Selection:
         taken = {name for effect in fit.effects for name in (effect.id, *effect.replaces)}
         return [name for name in self.names if name not in taken]
 
-    def _fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
-        """Fit the best sets of those scored."""
-        order = sorted(scored.values(), key=lambda item: -item[0])
-        self._begin([effects for _, effects in order[:BEGUN * self.settings.refits]],
-                    self.settings.refits)
-
-    def _begin(self, sets: Sequence[Sequence[Effect]], most: int) -> list[Fit]:
-        """
-        Fit sets for a few steps, and the best of these to the end, each from one start.
-
-        Parameters
-        ----------
-        sets : sequence of list of Effect
-        most : int
-            How many are fitted to the end.
-
-        Returns
-        -------
-        list of Fit
-            Those that were only begun, the best of each set of effects.
-        """
-        begun = self.fitter.fit(sets, self._metric(), FIRST_STEPS, exact=False)
-        best: dict[tuple[str, ...], Fit] = {}
-        for fit in sorted(begun, key=lambda fit: -fit.log_evidence):
-            best.setdefault(fit.names, fit)
-        self._fit([fit.effects for fit in list(best.values())[:most]])
-        return list(best.values())[most:]
-
     def _fit_from_all_starts(self, size: int) -> None:
         """
         Fit the most probable sets of a size from all starts of their effects.
@@ -303,8 +272,8 @@ class Selection:
             starts += itertools.product(*(
                 self._starts_of(effect, self.sets.base)
                 for effect in self.sets.fits[names].effects))
-        self._begin(starts, self.settings.refits)
-        self._refine(size)
+        self.fitting.begin(starts, self.settings.refits)
+        self.fitting.refine(size)
 
     def _exchange(self) -> None:
         """
@@ -323,14 +292,15 @@ class Selection:
             whole = self.sets.fits[names]
             for out in exchanged:
                 kept = [effect for effect in whole.effects if effect.id != out]
-                for fit in self.fitter.fit([kept], self._metric(), 0):
+                for fit in self.fitter.fit([kept], self.fitting.metric, 0):
                     rest = dataclasses.replace(
                         fit, covariance=whole.covariance, values=whole.values)
-                    self._fit(self._best_with(kept, self._linearised_at(rest).singles(), out))
-                    started = singles_as_started(self.fitter, rest, self._others(rest))
-                    self._begin(self._best_with(kept, started, out), 1)
-            self._refine(len(names))
-            self._refine_best()
+                    singles = self._linearised_at(rest).singles()
+                    self.fitting.fit(self._best_with(kept, singles, out))
+                    singles = singles_as_started(self.fitter, rest, self._others(rest))
+                    self.fitting.begin(self._best_with(kept, singles, out), 1)
+            self.fitting.refine(len(names))
+            self.fitting.refine_best()
 
     def _best_with(self, kept: Sequence[Effect],
                    scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
@@ -355,73 +325,3 @@ class Selection:
         if implausible and len(best) > 1 and self.sets.sufficient(best):
             return best, sorted(implausible)
         return (answer, sorted(answer)) if self.sets.sufficient(answer) else (frozenset(), [])
-
-    def _fit(self, sets: Sequence[Sequence[Effect]]) -> None:
-        """Fit sets to the end, and keep each where it is the best of its effects."""
-        for fit in itertools.chain(*self.fitter.shared(self._fitted, sets)):
-            self.sets.keep(fit)
-
-    def _fitted(self, effects: Sequence[Effect]) -> list[Fit]:
-        """Return a set fitted to the end and judged along its own way, nothing if that fails."""
-        return [self.fitter.polished(self.fitter.along(fit))
-                for fit in self.fitter.fit_one(effects, self._metric())]
-
-    def _metric(self) -> Point:
-        """Return the covariance in whose units fits are made: the expected discrepancy's."""
-        return self.covariance.points[1]
-
-    def _refine(self, size: int) -> None:
-        """Give the most probable sets of a size covariances of their own, then judge all anew."""
-        found = [names for names in self._ranked_of(size) if names not in self._refined]
-        self._refined.update(found)
-        values = dict(zip(found, map_in_forks(
-            self.fitter.covariance_values, [self.sets.fits[names] for names in found],
-            self.problem.jobs)))
-        for own in values.values():
-            self.covariance.add(own)
-
-        def refined(effects: Sequence[Effect]) -> list[Fit]:
-            names = frozenset(effect.id for effect in effects)
-            fit = self.fitter.refined(self.sets.fits[names], values[names])
-            least = self.fitter.least_squares(fit)
-            # Under a covariance the way to the maximum is rough, and not under white noise.
-            return [fit, least, self.fitter.polished(self.fitter.along(least))]
-
-        for names, (fit, least, polished) in zip(found, self.fitter.shared(
-                refined, [self.sets.fits[names].effects for names in found])):
-            self.sets.fits[names] = fit
-            self.sets.keep_least(names, least.predicted)
-            self.sets.keep(polished)
-        self.sets.judge_all()
-
-    def _refine_best(self) -> None:
-        """
-        Fit what remains of the most probable sets without any one of their effects.
-
-        Again, where it has less error at once than its own fit: that has ended in a local minimum,
-        out of which the further effect has led, whether it acts or not.
-        """
-        for _ in range(self.settings.most_effects):
-            starts = [effects for names in self.sets.valid()[:self.settings.beam]
-                      for effects in self._worth_fitting_without(names)]
-            if not starts:
-                return
-            self._fit(starts)
-
-    def _worth_fitting_without(self, names: frozenset[str]) -> list[list[Effect]]:
-        """Return what a set holds without any one effect, where that is to be fitted from there."""
-        fit, starts = self.sets.fits[names], []
-        for fewer in filter(None, subsets(names)):
-            effects = [effect for effect in fit.effects if effect.id in fewer]
-            if (names, fewer) in self._reduced:
-                continue
-            if fewer in self.sets.fits:
-                predicted, = self.fitter.simulate([effects])
-                if not self.fitter.error(predicted) < self.sets.error(fewer):
-                    continue
-            self._reduced.add((names, fewer))
-            starts.append(effects)
-        return starts
-
-    def _ranked_of(self, size: int) -> list[frozenset[str]]:
-        return [names for names in self.sets.ranked() if len(names) == size][:self.settings.beam]
