@@ -51,15 +51,16 @@ def test_intervals_under_noise_that_lasts_hold_the_truth_as_often_as_they_say(er
     pytest.param(1, 0.98, marks=pytest.mark.long),
     pytest.param(2, 0.98, marks=pytest.mark.long),
     pytest.param(4, 0.9, marks=pytest.mark.long)])
-def test_nothing_is_named_where_noise_lasts(trials, rho):
+def test_noise_that_lasts_is_no_effect(trials, rho):
     """
     For 50 rows of a trial's 60 it is nearly an offset of each trial, for 10 a drift.
 
-    None of 40: if more than 11 % were named, that would happen in less than 1 % of all cases. And
-    if one in twenty were not called adequate, that would be more than 6 in 0.3 %.
+    It is larger than what the model may be wrong by, so that most of these recordings are said to
+    have a cause that is in no catalogue. If one in fifty were given a name, as is asked for, more
+    than 3 of 40 would be in less than 1 % of all cases.
     """
     table = experiment_tables('arm-steps', {}, SPECIMEN)['train.csv']
     clean, model = Measurement.from_columns(table).select(range(trials)), bench_model(SPECIMEN)
     found = [diagnose(model, [noisy(clean, rho, seed)], seed=seed) for seed in range(RUNS)]
-    assert {seed: one.missing for seed, one in enumerate(found) if one.missing} == {}
-    assert sum(one.verdict != 'adequate' for one in found) <= 6
+    assert sum(bool(one.missing) for one in found) <= 3
+    assert all(one.verdict in ('adequate', 'unknown') for one in found if not one.missing)

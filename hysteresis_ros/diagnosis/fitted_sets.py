@@ -226,10 +226,10 @@ class FittedSets:
         All values are physical, and each effect matters: without it the error is larger by a
         practical size, and by more than the expected error of the base model; or, as that repeats
         itself with the drive, it remembers something of its own, and the set is clearly less
-        probable without it. If others stay, without it the error is larger than the base model's
-        own could be, or these are clearly less probable. A single effect also has to explain more
-        than the best of all would by chance; and no set of as few effects has a smaller residual,
-        by more than the base model's error and that of an effect's equation could be.
+        probable without it. And without it the error is larger than the base model's own could be,
+        or what stays is clearly less probable. A single effect also has to explain more than the
+        best of all would by chance; and no set of as few effects has a smaller residual, by more
+        than the base model's error and that of an effect's equation could be.
         """
         physical = [names for names in self.ranked() if not self.fits[names].implausible()]
         return [names for names in physical if self._each_matters(names)
@@ -244,7 +244,7 @@ class FittedSets:
             before = self.own_error(without)
             least = max(self.settings.practical * before,
                         LEAST_SHARE * self.own_error(frozenset()))
-            if before - error < least or (without and self._would_do(without, names)):
+            if before - error < least or self._would_do(without, names):
                 return False
             if (before ** 2 - error ** 2 < self.covariance.size ** 2
                     and not (self._remembers(names - without)
