@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.effects import catalogue, Inputs
-from model_support import STRENGTHS
+from hysteresis_ros.model.simulation import Simulator
+from model_support import arm_run, bicep_model, effect_of, STRENGTHS, wandering_voltage
 
 angles = st.lists(st.floats(0.5, 2.5), min_size=1, max_size=20)
 
@@ -61,6 +62,18 @@ def test_latency_shows_the_rest_before_a_trial_first():
     np.testing.assert_allclose(whole, [3.0, 2.0, 1.75])
     single = [late.step(value, each) for value, each in zip(response, dt)]
     np.testing.assert_allclose(single, whole)
+
+
+@pytest.mark.parametrize('onset', [False, True])
+def test_the_rest_before_a_trial_is_measured_as_what_follows_it(onset):
+    """Angles that arrive late are off by the offset from the first one on."""
+    model, history = bicep_model(), {'history': (np.arange(30) < 20).astype(float)}
+    run = arm_run(wandering_voltage(30), 0.1, **(history if onset else {}))
+    late = effect_of(model, 'latency', delay=0.35)
+    off = effect_of(model, 'encoder_offset', offset=3.0)
+    simulated = [Simulator(model, run, before=effects if onset else None).run(effects)
+                 for effects in ([late], [late, off])]
+    np.testing.assert_allclose(simulated[1], simulated[0] + math.radians(3.0), rtol=0, atol=1e-12)
 
 
 @given(st.lists(st.tuples(st.floats(0.5, 2.5), st.floats(0.01, 1.0)), min_size=1, max_size=20),

@@ -225,7 +225,16 @@ class SensorEffect(Effect):
     dead_band: float = 0.0
 
     def begin(self, rest: float) -> None:
-        """Take up the true response of the state of rest before a trial, after `start`."""
+        """Take up the response of the state of rest before a trial, after `start`."""
+
+    def begun(self, rest: float) -> float:
+        """Start from the state of rest with its response, and return what it is measured as."""
+        self.start()
+        self.begin(rest)
+        measured = self.step(rest, 0.0)
+        self.start()
+        self.begin(rest)
+        return measured
 
     def forward(self, response: Values, inputs: Inputs) -> Values:
         """Map the response of one trial, shape (rows,)."""

@@ -295,7 +295,8 @@ class Chain:
         """Return what the sensor says of the true response of one trial (rows,) after a rest."""
         for effect in self.sensor:
             effect.start()
+            # Each is given the rest as those before it measure it.
             if rest is not None:
-                effect.begin(rest)
+                rest = effect.begun(rest)
             response = effect.forward(response, inputs)
         return response

@@ -134,12 +134,12 @@ class Past:
 
     def measured(self, chain: Chain, response: np.ndarray, inputs: Inputs) -> np.ndarray:
         """Return what the sensor says of the true response of the trial, shape (rows,)."""
-        last = self.rows - 1
+        last, rest = self.rows - 1, self.rest
         for effect in chain.sensor:
             effect.start()
             if effect.id in self._sensor:
-                if self.rest is not None:
-                    effect.begin(self.rest)
+                if rest is not None:
+                    rest = effect.begun(rest)
                 response = effect.forward(response, inputs)
             else:
                 effect.begin(float(response[last]))
