@@ -23,12 +23,12 @@ SETTLED, MOVING = 30.0, 0.1     # s between rows
 CASES = {
     'settled': (SETTLED, {}),
     'viscous': (MOVING, {'viscous_friction': {'b': 0.05}}),
-    # An arm whose ringing nothing damps makes any difference larger, swing by swing.
     'inertia': (MOVING, {'inertia': {'I': 0.002, 'b': 0.05}}),
 }
 # As many rows as a moving recording has, so that what a call takes besides counts as it does there.
 ROWS, REPEATS = 12000, 5
-# Rows of which angles are compared: what rings makes any difference larger, swing by swing.
+# Rows of which angles are compared: an arm whose ringing nothing damps makes any difference larger,
+# swing by swing.
 COMPARED = 3000
 QUICK_ROWS, QUICK_REPEATS = 200, 2
 SETPOINTS, QUICK_SETPOINTS = 20000, 500

@@ -399,6 +399,30 @@ def test_an_effect_within_the_models_own_error_needs_a_memory_of_its_own(model, 
     assert (found.sets.valid()[0] == {name}) == named
 
 
+@pytest.mark.parametrize('suffices, odds, named', [
+    (True, 3.0, False), (True, 5.0, True), (False, 3.0, True)])
+def test_a_single_effect_has_to_be_clearly_more_probable_than_a_model_that_may_do(
+        payload, monkeypatch, suffices, odds, named):
+    """Odds of fifty to one are a logarithm of 3.9."""
+    single = frozenset(['payload_error'])
+    monkeypatch.setattr(payload.sets, 'sufficient', lambda names: names == single or suffices)
+    monkeypatch.setattr(payload.sets, 'log_posterior', lambda names: odds * (names == single))
+    monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: 0.0)
+    assert (single in payload.sets.valid()) == named
+
+
+def test_an_effect_that_has_no_fit_of_its_own_is_judged_in_a_set(payload, monkeypatch):
+    pair, single = frozenset(['payload_error', 'frame_tilt']), frozenset(['payload_error'])
+    fits = {frozenset(): payload.sets.base, single: payload.sets.fits[single]}
+    both, = payload.fitter.fit([[*fits[single].effects, effect_of(
+        payload.problem.model, 'frame_tilt', phi=2.0)]], payload.fitting.metric, 0)
+    monkeypatch.setattr(payload.sets, 'fits', {**fits, pair: payload.fitter.judge(both)})
+    monkeypatch.setattr(payload.sets, 'own_error', lambda names: 1.0 / (1 + len(names)))
+    monkeypatch.setattr(payload.sets, 'sufficient', lambda names: False)
+    monkeypatch.setattr(payload.covariance, 'size', 10.0)
+    assert payload.sets.valid() == [frozenset()]
+
+
 def test_an_implausible_set_is_no_answer_however_well_it_explains(model):
     """A payload that is too heavy by more than its range is something else."""
     far = effect_of(model, 'payload_error', dm=15.0)

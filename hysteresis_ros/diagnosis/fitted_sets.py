@@ -247,14 +247,15 @@ class FittedSets:
             if before - error < least or self._would_do(without, names):
                 return False
             if (before ** 2 - error ** 2 < self.covariance.size ** 2
-                    and not (self._remembers(names - without)
+                    and not (self._remembers(names, without)
                              and self._clearly_more_probable(names, without))):
                 return False
         return True
 
-    def _remembers(self, names: frozenset[str]) -> bool:
-        """Whether effects have a memory of their own."""
-        return all(effect.memory for effect in self.fits[names].effects)
+    def _remembers(self, names: frozenset[str], without: frozenset[str]) -> bool:
+        """Whether what a set has more than a smaller one has a memory of its own."""
+        return all(effect.memory for effect in self.fits[names].effects
+                   if effect.id not in without)
 
     def _surpassed(self, names: frozenset[str], others: Iterable[frozenset[str]]) -> bool:
         """Whether another set of as few effects predicts far better."""

@@ -227,7 +227,7 @@ class SensorEffect(Effect):
     def begin(self, rest: float) -> None:
         """Take up the response of the state of rest before a trial, after `start`."""
 
-    def begun(self, rest: float) -> float:
+    def start_from(self, rest: float) -> float:
         """Start from the state of rest with its response, and return what it is measured as."""
         self.start()
         self.begin(rest)

@@ -297,6 +297,6 @@ class Chain:
             effect.start()
             # Each is given the rest as those before it measure it.
             if rest is not None:
-                rest = effect.begun(rest)
+                rest = effect.start_from(rest)
             response = effect.forward(response, inputs)
         return response

@@ -57,7 +57,7 @@ class Observer:
         """
         rest = self._arm.start((self._time or 0.0) if time is None else time)
         for effect in self._chain.sensor:
-            rest = effect.begun(rest)
+            rest = effect.start_from(rest)
         self._time = time
         self._drive = self.model.cold_drive
 

@@ -139,7 +139,7 @@ class Past:
             effect.start()
             if effect.id in self._sensor:
                 if rest is not None:
-                    rest = effect.begun(rest)
+                    rest = effect.start_from(rest)
                 response = effect.forward(response, inputs)
             else:
                 effect.begin(float(response[last]))
