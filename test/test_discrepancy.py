@@ -331,3 +331,21 @@ def test_what_the_sensor_adds_is_no_way_of_the_arm():
     offset = effect_of(model, 'encoder_offset', offset=5.0)
     assert np.abs(clean).max() > 1e-3
     np.testing.assert_array_equal(load_history(problem, [offset]).path, clean)
+
+
+@pytest.mark.parametrize('name, values', [
+    ('overload', {'Fy': 1.0, 'compliance': 5.0}), ('fatigue', {'b': -5.0}),
+    # As far as the arm goes.
+    ('overload', {'Fy': 0.9, 'compliance': 15.0})])
+def test_what_has_lengthened_the_muscle_for_good_does_so_in_both_models(name, values):
+    """Else the arm would seem to have been elsewhere if its present load had acted all along."""
+    model = bicep_model()
+    moving = arm_run(np.concatenate([np.linspace(0.0, 6.0, 20), np.linspace(6.0, 0.0, 20)]))
+    effect = effect_of(model, name, **values)
+    problem = problem_for(model.with_effects([effect]), [moving])
+    longer, = problem.simulate_many([[effect]]) - problem.simulate_many([[]])
+    assert np.abs(longer).max() > 0.4
+    plain = np.abs(path_of(model, moving))
+    found = np.abs(load_history(problem, [effect]).path)
+    assert found.max() < 3.0 * plain.max()
+    assert max(found[0], found[-1]) < 0.2 * found.max()

@@ -97,15 +97,17 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
                 for values in (arm.tension, arm.load, arm.width))
             if not first.loaded:
                 felt, width = 0.0 * felt, 0.0 * width
-            moving = _held(stage, model.sign * (x - felt), width)
+            moving = _held(stage, model.sign * (x - felt), width)[1:]
             path = np.zeros(len(judged))
             if first.loaded:
                 still = np.stack([
                     _held(stage, model.sign * (x - load), np.full(len(x), arm.width_at(load)))
-                    for load in loads])
-                path = (arm.angle(loads, still[:, 1:][:, judged])
-                        - arm.angle(loads, moving[None, 1:][:, judged]))
-            yield tension[1:][judged], moving[1:][judged] / span, path
+                    for load in loads])[:, 1:]
+                # What has lengthened the muscle besides, or holds the arm, does so either way.
+                besides = arm.demand_at(angle[trial.rows]) - arm.demand_at(arm.angle(loads, moving))
+                path = (arm.angle(loads, (still + besides)[:, judged])
+                        - arm.angle(loads, (moving + besides)[judged]))
+            yield tension[1:][judged], moving[judged] / span, path
 
 
 class _Statics:
@@ -135,15 +137,34 @@ class _Statics:
         """Return by how much the loop is wider under a load."""
         return float(np.interp(load, self.load[self._by_load], self.width[self._by_load]))
 
+    def demand_at(self, angle: np.ndarray) -> np.ndarray:
+        """Return H2's output above its least that angles (rows,) [rad] demand."""
+        return np.interp(angle, self.theta, self._demand)
+
     def angle(self, loads: np.ndarray, outputs: np.ndarray) -> np.ndarray:
-        """Return the angle (rows,) at which outputs (loads, rows) give what the arm demands."""
-        if len(outputs) > 1:
+        """
+        Return the angle [rad] at which outputs give what the arm demands.
+
+        Parameters
+        ----------
+        loads : ndarray, shape (LOADS,)
+        outputs : ndarray, shape (rows,) or (LOADS, rows)
+            Of H2, above its least, whatever the load, or under each of the loads.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+        """
+        if outputs.ndim > 1:
             place = np.clip((self.load - loads[0]) / (loads[1] - loads[0]), 0.0, len(loads) - 1.001)
             below = place.astype(int)
             part = (place - below)[:, None]
             outputs = (1.0 - part) * outputs[below] + part * outputs[below + 1]
-        theta, lacking = self.theta, outputs - self._demand[:, None]
-        above = np.clip(np.argmax(lacking < 0.0, axis=0), 1, len(theta) - 1)
+        theta, lacking = self.theta, np.atleast_2d(outputs) - self._demand[:, None]
+        # Beyond the last angle nothing is lacking anywhere.
+        short = lacking < 0.0
+        first = np.where(np.any(short, axis=0), np.argmax(short, axis=0), len(theta) - 1)
+        above = np.clip(first, 1, len(theta) - 1)
         column = np.arange(lacking.shape[1])
         before, after = lacking[above - 1, column], lacking[above, column]
         share = np.clip(before / np.where(before == after, 1.0, before - after), 0.0, 1.0)
