@@ -1,0 +1,63 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Sets of effects are fitted to the maximum of their own covariance."""
+
+import dataclasses
+
+from model_support import bicep_model, effect_of
+import pytest
+from selection_support import recording, selection, TRIED
+
+from hysteresis_ros.effects import catalogue
+
+
+@pytest.fixture(scope='module')
+def model():
+    """Return the model without effects."""
+    return bicep_model()
+
+
+def test_a_fit_that_is_better_from_the_least_squares_on_is_kept(model, monkeypatch):
+    """Under a covariance the way to the maximum may be too rough."""
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+    found.fitting._refined.clear()
+    monkeypatch.setattr(found.fitter, 'polished', lambda fit: dataclasses.replace(
+        fit, log_evidence=1e6))
+    found.fitting.refine(1)
+    assert found.sets.fits[frozenset(['payload_error'])].log_evidence == 1e6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('hidden, judged', [
+    ({'payload_error': {'dm': -15.0}, 'supply_sag': {'Rs': 0.8}}, None),
+    ({'end_stop': {}, 'payload_error': {'dm': 25.0}}, 'payload_error')],
+    ids=['all', 'least-squares'])
+def test_sets_are_fitted_in_the_units_that_they_are_judged_by(hidden, judged):
+    """Fitted once more from their values they gain nothing, where the way there is rough, too."""
+    model = bicep_model(metrics={'length': {'verification': {'rmse': 1e-4}}})
+    effects = [effect_of(model, name, **values) for name, values in hidden.items()]
+    found = selection(model, recording(model, effects),
+                      [*TRIED, 'airflow', 'pwm_dead_zone', 'end_stop'])
+    for names, fit in found.sets.fits.items():
+        if judged is None or names == {judged}:
+            assert found.fitter.polished(fit).log_evidence < fit.log_evidence + 1.0, names
+
+
+def test_a_further_effect_that_only_led_out_of_a_local_minimum_is_no_answer(model):
+    """What is left without it is fitted from where it ended, once."""
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+    single = frozenset(['payload_error'])
+    offset = catalogue()['encoder_offset'](model.surroundings)
+    least = 1.01 * next(one.low for one in offset.parameters if one.name == 'offset')
+    pair, = found.fitter.fit([[*found.sets.fits[single].effects,
+                               offset.with_values(offset=least)]], found.fitting.metric, 0)
+    stuck, = found.fitter.fit([[effect_of(model, 'payload_error', dm=1.0)]], found.fitting.metric,
+                              0)
+    found.sets.fits = {frozenset(): found.sets.base, frozenset(pair.names): pair, single: stuck}
+    found.sets.keep_least(single, stuck.predicted)
+    assert found.sets.valid()[0] == {'payload_error', 'encoder_offset'}
+    found.fitting.refine_best()
+    assert found.sets.valid()[0] == single
+    assert found.sets.fits[single].effects[0].dm == pytest.approx(15.0, abs=1.0)
+    # Nothing is left that a larger set would begin better.
+    assert found.fitting._worth_fitting_without(frozenset(pair.names)) == []
