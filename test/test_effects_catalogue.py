@@ -177,6 +177,20 @@ def test_implausible_values_are_named_but_neutral_ones_are_not():
     assert effect_of(model, 'end_stop', stop=1.0, side=0.5, stiffness=1.0).implausible() == ['side']
 
 
+@pytest.mark.parametrize('values, named', [
+    ({'dx': 0.1, 'da': 0.0, 'dz': 2.0}, []), ({'dx': 0.45, 'da': 0.1, 'dz': -0.1}, []),
+    ({'dx': 0.1, 'da': 0.2, 'dz': -0.1}, ['dx', 'da', 'dz']), ({'dx': 0.1, 'dz': 9.0}, ['dz'])])
+def test_of_parameters_that_are_one_size_together_one_has_to_be_large(values, named):
+    """A clamp that is where it should be says nothing against an anchor that is not."""
+    found = effect_of(bicep_model(), 'geometry_error', **values)
+    assert found.implausible(slack=0.15) == named
+
+
+def test_a_drift_that_begins_flat_is_a_drift():
+    drift = effect_of(bicep_model(), 'ambient_drift', rate=0.01, curvature=2.0)
+    assert drift.implausible(duration=600.0) == []
+
+
 @pytest.mark.parametrize('values, duration, named', [
     ({'offset': 6.0, 'rate': 9.0, 'curvature': 6.0}, 600.0, ['total']),
     # An end of the recording within the range, and so the start, but not the change between them.

@@ -73,8 +73,9 @@ class AmbientDrift(ThermalEffect):
                   0.0, (0.0,), both_signs=True),
         Parameter('rate', 'V^2/10 min', 'change of that', 0.05, 12.0, 0.0, (-1.0, 1.0),
                   both_signs=True),
-        Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.0, 8.0, 0.0, (0.0,),
+        Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.05, 8.0, 0.0, (0.0,),
                   both_signs=True),)
+    together = ('rate', 'curvature')
 
     CLOCK_UNIT = 600.0
     # What all terms are together, at any time, and their change over a recording [V^2]: 20 K.

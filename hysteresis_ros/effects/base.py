@@ -198,6 +198,8 @@ class Effect(abc.ABC):
     invertible: ClassVar[bool] = True
     # Whether it acts before the onset of what a diagnosis tries, too: an error of the model.
     lasting: ClassVar[bool] = False
+    # Parameters that are the effect's size together: all but one of them may be too small.
+    together: ClassVar[tuple[str, ...]] = ()
     # Names of the attributes that hold what it remembers of the past; `start` sets them.
     memory: ClassVar[tuple[str, ...]] = ()
 
@@ -280,9 +282,16 @@ class Effect(abc.ABC):
             Of the recording [s]; an effect whose terms add up over it names what is too large
             together as well.
         """
-        return [parameter.name for parameter in self.parameters
-                if self.values[parameter.name] != parameter.neutral
-                and not parameter.plausible(self.values[parameter.name], slack)]
+        odd = [parameter for parameter in self.parameters
+               if self.values[parameter.name] != parameter.neutral
+               and not parameter.plausible(self.values[parameter.name], slack)]
+        small = [parameter.name for parameter in self.parameters
+                 if abs(self.values[parameter.name]) < parameter.low / (1.0 + slack)]
+        # One alone has to be large enough.
+        if not set(self.together).issubset(small):
+            odd = [parameter for parameter in odd
+                   if parameter.name not in self.together or parameter.name not in small]
+        return [parameter.name for parameter in odd]
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain types for the model file."""

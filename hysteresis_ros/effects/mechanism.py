@@ -157,10 +157,11 @@ class GeometryError(MechanismEffect):
     parameters = (
         Parameter('dx', 'mm', 'clamp further out than assumed', 0.5, 5.0, 0.0, (-1.0, 1.0),
                   both_signs=True),
-        Parameter('da', 'mm', 'clamp higher than assumed', 0.0, 5.0, 0.0, (0.0,),
+        Parameter('da', 'mm', 'clamp higher than assumed', 0.5, 5.0, 0.0, (0.0,),
                   both_signs=True),
-        Parameter('dz', 'mm', 'anchor higher, or muscle shorter, than assumed', 0.0, 5.0, 0.0,
+        Parameter('dz', 'mm', 'anchor higher, or muscle shorter, than assumed', 0.5, 5.0, 0.0,
                   (0.0,), both_signs=True),)
+    together = ('dx', 'da', 'dz')
 
     def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Replace length and moment arm by those of the other linkage."""
