@@ -58,6 +58,14 @@ def test_the_models_own_arm_reaches_every_target(names):
     np.testing.assert_allclose(angles, targets, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize('seat', [-1.0, 0.5, 1.0])
+def test_targets_are_reached_wherever_in_its_play_the_encoder_was_zeroed(seat):
+    model = bicep_model()
+    play = effect_of(model, 'backlash', B=3.0, seat=seat)
+    angles, _ = drive_arm(model.with_effects([play]), SOME)
+    np.testing.assert_allclose(angles, SOME, rtol=0.0, atol=1e-6)
+
+
 @pytest.mark.parametrize('names', [*((name,) for name in PHASE),
                                    ('resistance_change', 'series_compliance')])
 def test_the_arm_reaches_targets_once_the_phase_agrees(names):

@@ -333,9 +333,15 @@ def test_encoder_offset_is_constant():
     assert np.ptp(offset) < 0.1 and offset[0] > 6.0
 
 
-def test_backlash_is_a_play():
-    """After a reversal the reading stands still for the width of the play, then follows."""
-    arm = calm(backlash=0.1)
+@pytest.mark.parametrize('used', [0.0, 1.0])
+def test_backlash_is_a_play(used):
+    """
+    After a reversal the reading stands still for the width of the play, then follows.
+
+    Zeroed after the arm has come down by itself, it does so from the first turn on.
+    """
+    arm = calm(backlash=0.1, backlash_used=used)
+    assert arm.measured_angle == arm.angle
     true, read = [], []
     for voltage in np.concatenate((np.linspace(0.0, 6.0, 60), np.linspace(6.0, 0.0, 120))):
         arm.settle(30.0, voltage)
@@ -343,10 +349,10 @@ def test_backlash_is_a_play():
         read.append(arm.measured_angle)
     true, read = np.array(true), np.array(read)
     turn = np.argmin(true)
-    assert read[turn] == pytest.approx(true[turn] + 0.05, abs=1e-9)
+    assert read[turn] == pytest.approx(true[turn] + 0.05 * (1.0 + used), abs=1e-9)
     inside = true[turn:] < true[turn] + 0.1
     np.testing.assert_allclose(read[turn:][inside], read[turn])
-    assert read[-1] == pytest.approx(true[-1] - 0.05, abs=1e-9)
+    assert read[-1] == pytest.approx(true[-1] - 0.05 * (1.0 - used), abs=1e-9)
 
 
 def test_latency_delays_the_reading():

@@ -41,57 +41,80 @@ class EncoderOffset(SensorEffect):
 
 
 class Backlash(SensorEffect):
-    """Play between shaft and encoder."""
+    """
+    Play between shaft and encoder.
+
+    The encoder is zeroed at the state of rest before a trial. Where in its play it lies there
+    depends on how the arm came to rest: a muscle that has cooled down has left it at one end.
+    """
 
     id = 'backlash'
     rowwise = True
     sentence = 'The encoder stands still until the play at its coupling is used up.'
-    equation = 'play operator of width B between shaft and encoder'
+    equation = ('play operator of width B between shaft and encoder, zeroed at rest: theta_m is '
+                'from theta + (seat - 1) B / 2 to theta + (seat + 1) B / 2')
     source = 'play operator'
     shows_in = 'reversals'
     experiment = 'move the arm by hand and watch the counts'
     confused_with = ('coulomb_friction',)
     kinds = ('arm',)
     parameters = (
-        Parameter('B', 'deg', 'width of the play', 0.2, 12.0, 0.0, (1.0, 4.0), log=True),)
+        Parameter('B', 'deg', 'width of the play', 0.2, 12.0, 0.0, (1.0, 4.0), log=True),
+        Parameter('seat', '1', 'where in its play the encoder rests before a trial: 0 in the '
+                  'middle, 1 where a turn to larger angles moves it at once, -1 one to smaller',
+                  -1.0, 1.0, 0.0, (0.0, 1.0, -1.0), limits=(-1.0, 1.0), form=True))
 
     memory = ('_state', '_target', '_lead')
 
-    # Where the encoder is, and the target before; None before a trial.
+    # Where the encoder is, or was at rest, and the target before; None before a trial.
     _state: float | None
     _target: float | None
 
     def start(self) -> None:
-        """Forget the past: the play is centred at the first sample."""
+        """Forget the past: the encoder is zeroed at the first sample, if not at a rest before."""
         self._state = None
         self._target = None
         self._lead = 0.0
 
+    def begin(self, rest: float) -> None:
+        """Zero the encoder at rest."""
+        self._state = rest
+
+    @property
+    def _half(self) -> float:
+        return 0.5 * math.radians(self.B)
+
+    @property
+    def _middle(self) -> float:
+        """What the encoder shows more than the angle in the middle of its play [rad]."""
+        return self.seat * self._half
+
     def step(self, value: float, dt: float) -> float:
         """Move the encoder only when the play is used up."""
-        half = 0.5 * math.radians(self.B)
         state = value if self._state is None else self._state
-        self._state = min(max(state, value - half), value + half)
+        middle = value + self._middle
+        self._state = min(max(state, middle - self._half), middle + self._half)
         return self._state
 
     def forward(self, response: np.ndarray, inputs: Inputs) -> np.ndarray:
         """Do what `step` does for a whole trial."""
-        self.start()
-        course = follow(np.ascontiguousarray(response, float), 0.5 * math.radians(self.B),
-                        float(response[0]))
+        place = response[0] if self._state is None else self._state
+        course = follow(np.ascontiguousarray(response + self._middle, float), self._half,
+                        float(place))
         self._state = float(course[-1])
         return course
 
     def inverse(self, response: float) -> float:
         """Go further by half the play in the direction of the motion."""
-        way = 0.0 if self._target is None else response - self._target
+        before = self._state if self._target is None else self._target
+        way = 0.0 if before is None else response - before
         if way * self._lead > 0.0 or abs(way) > self.dead_band:
-            self._lead = math.copysign(0.5 * math.radians(self.B), way)
+            self._lead = math.copysign(self._half, way)
             self._target = response
         elif self._target is None:
             self._target = response
         # Not a turn yet: the furthest target goes on to count.
-        return self._target + self._lead
+        return self._target + self._lead - self._middle
 
 
 class Latency(SensorEffect):

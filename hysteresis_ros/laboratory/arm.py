@@ -307,8 +307,9 @@ class Arm:
             self._velocity = 0.0
 
     def _sense(self) -> None:
-        half = 0.5 * self.conditions.backlash
-        self._played = min(max(self._played, self.angle - half), self.angle + half)
+        play, used = self.conditions.backlash, self.conditions.backlash_used
+        behind, ahead = 0.5 * (1.0 - used) * play, 0.5 * (1.0 + used) * play
+        self._played = min(max(self._played, self.angle - behind), self.angle + ahead)
         self._history.append((self.time, self._seen()))
         if self.conditions.latency <= 0.0:
             while len(self._history) > 1:

@@ -141,6 +141,9 @@ class Conditions:
         the arm; side 0: no stop.
     encoder_offset, backlash, latency : float
         Of the encoder [rad], [rad], [s].
+    backlash_used : float
+        Where in its play the encoder is zeroed: 0 in the middle, 1 where an arm that rises to
+        larger angles takes it along at once, -1 where one that goes to smaller ones does.
     disc : EncoderDisc
         What the encoder reads.
     disturbances : list of Disturbance
@@ -176,6 +179,7 @@ class Conditions:
     stop_stiffness: float = 20.0
     encoder_offset: float = 0.0
     backlash: float = 0.0
+    backlash_used: float = 0.0
     latency: float = 0.0
     disc: EncoderDisc = EncoderDisc()
     disturbances: list = dataclasses.field(default_factory=list)

@@ -259,6 +259,8 @@ def _encoder_eccentricity(conditions: Conditions, size: float, specimen: np.rand
 def _backlash(conditions: Conditions, size: float, specimen: np.random.Generator,
               recording: np.random.Generator) -> None:
     conditions.backlash = math.radians(8.0) * size
+    # Turned back by hand before it is zeroed, or left as the muscles have cooled down.
+    conditions.backlash_used = float(specimen.integers(0, 2))
 
 
 def _latency(conditions: Conditions, size: float, specimen: np.random.Generator,

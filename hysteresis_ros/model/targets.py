@@ -66,6 +66,8 @@ class Targets:
             If the arm cannot be held there; nothing is remembered of that target.
         """
         self._geometry.check_angle(theta)
+        if self._angle is None and self._chain.sensor:
+            self._begin()
         before = self._chain.save()
         try:
             true = theta
@@ -76,6 +78,12 @@ class Targets:
         except RangeError:
             self._chain.restore(before)
             raise
+
+    def _begin(self) -> None:
+        """Start the sensor from the cold arm's angle."""
+        rest = self._angle_at_rest()
+        for effect in self._chain.sensor:
+            rest = effect.start_from(rest)
 
     def _hold(self, theta: float, true: float) -> Reference:
         friction, capstan = self._friction()
