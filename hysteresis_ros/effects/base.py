@@ -198,7 +198,7 @@ class Effect(abc.ABC):
     invertible: ClassVar[bool] = True
     # Whether it acts before the onset of what a diagnosis tries, too: an error of the model.
     lasting: ClassVar[bool] = False
-    # Parameters that are the effect's size together: all but one of them may be too small.
+    # Parameters that are the effect's size together: each may be too small if not all of them are.
     together: ClassVar[tuple[str, ...]] = ()
     # Names of the attributes that hold what it remembers of the past; `start` sets them.
     memory: ClassVar[tuple[str, ...]] = ()
@@ -285,12 +285,11 @@ class Effect(abc.ABC):
         odd = [parameter for parameter in self.parameters
                if self.values[parameter.name] != parameter.neutral
                and not parameter.plausible(self.values[parameter.name], slack)]
-        small = [parameter.name for parameter in self.parameters
-                 if abs(self.values[parameter.name]) < parameter.low / (1.0 + slack)]
-        # One alone has to be large enough.
-        if not set(self.together).issubset(small):
-            odd = [parameter for parameter in odd
-                   if parameter.name not in self.together or parameter.name not in small]
+        size = math.hypot(*(self.values[parameter.name] / parameter.low
+                            for parameter in self.parameters if parameter.name in self.together))
+        if size >= 1.0 / (1.0 + slack):
+            odd = [parameter for parameter in odd if parameter.name not in self.together
+                   or abs(self.values[parameter.name]) > parameter.low]
         return [parameter.name for parameter in odd]
 
     def to_dict(self) -> dict[str, Any]:
