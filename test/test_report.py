@@ -199,6 +199,7 @@ def test_a_value_outside_its_range_is_warned_of(case, tmp_path):
     ('unknown', {'unexplained': 0.6, 'signal': 'cycles'}, ['shows in cycles', '60 %']),
     ('unknown', {'uneven': True}, ['like noise', 'larger at some times']),
     ('unknown', {'resembles': ['end_stop', 'slack']}, ['like end_stop with slack', 'not physical']),
+    ('unknown', {'explains_most': ['backlash']}, ['backlash would explain most', 'what stays']),
     ('not_excited', {}, ['moves too little']),
     ('adequate', {}, ['no effect of the catalogue'])])
 def test_the_words_say_what_was_found(verdict, changes, words):

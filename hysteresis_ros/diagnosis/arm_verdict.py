@@ -11,7 +11,7 @@ once.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -20,6 +20,7 @@ import numpy as np
 from hysteresis_ros.diagnosis import events, significance, verdict
 from hysteresis_ros.diagnosis.kept_strain import kept_strain
 from hysteresis_ros.diagnosis.observable import present
+from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.diagnosis.residual import unexplained_signal
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.effects import catalogue, Effect
@@ -81,6 +82,7 @@ class _Verdict:
         best = valid[0] if valid else frozenset()
         unobservable = {**selection.unobservable, **self._too_weak()}
         resembles = self._resembles(best) if unknown else []
+        explains_most = self._explains_most(best) if unknown and not resembles else []
         kind = 'unknown' if unknown else self._known(chosen, unobservable)
         alternatives = self._alternatives(chosen, valid)
         fits = self.fitter.cross_validate([self.sets.base, self.sets.fits[chosen]])
@@ -88,7 +90,7 @@ class _Verdict:
         effects = self._in_order(self.fitter.with_intervals(self.sets.fits[chosen]))
         missing = [effect.id for effect in effects]
         kept = None if unknown else kept_strain(selection, self.sets.fits[chosen])
-        to_add = missing or resembles or ([kept['effect']] if kept else [])
+        to_add = missing or resembles or explains_most or ([kept['effect']] if kept else [])
         happened = event if unknown and event_log > self._log_mass(valid) else None
         return verdict.Diagnosis(
             verdict=kind, missing=missing,
@@ -100,7 +102,8 @@ class _Verdict:
             experiment=verdict.next_experiment(
                 kind, to_add, [alternatives[name] for name in missing], unobservable),
             effects=effects, rmse_before=before, rmse_after=after, not_excited=unobservable,
-            event=happened, resembles=resembles, uneven=unknown and self.sets.uneven(chosen),
+            event=happened, resembles=resembles, explains_most=explains_most,
+            uneven=unknown and self.sets.uneven(chosen),
             signal=unexplained_signal(problem, problem.measured - self.sets.fits[
                 chosen].predicted) if unknown else '',
             kept_strain=kept)
@@ -195,20 +198,32 @@ class _Verdict:
             return []
         return sorted(names)
 
+    def _explains_most(self, best: frozenset[str]) -> list[str]:
+        """Name the effects of a set that takes most of the mean square error off."""
+        if not self.sets.own_error(best) ** 2 < 0.5 * self.sets.own_error(frozenset()) ** 2:
+            return []
+        return [effect.id for effect in self._in_order(self.sets.fits[best].effects)]
+
     def _too_weak(self) -> dict[str, str]:
         """Effects that even at the upper end of their range would not stand out here."""
-        selection, kind = self.selection, self.problem.kind
-        strongest = []
-        for name in selection.names:
-            effect = present(self.problem.model, catalogue()[name])
-            strongest.append(effect.with_values(**{
-                parameter.name: (parameter.choices[-1] if parameter.choices else parameter.high)
-                for parameter in effect.parameters if kind in parameter.kinds}))
-        changes = self.fitter.simulate([[one] for one in strongest]) - self.sets.base.predicted
-        sizes = np.sqrt(np.mean(changes ** 2, axis=1))
-        return {name: 'even a strong one would change less than the noise'
-                for name, size in zip(selection.names, sizes)
-                if np.isfinite(size) and size < LEAST_CHANGE * self.sets.rmse_95}
+        weak = self._weak(self.selection.names, _strongest)
+        # Some show best at other values than the largest, as what creeps slowly does not.
+        weak = self._weak(weak, _strongest_starts)
+        return {name: 'even a strong one would change less than the noise' for name in weak}
+
+    def _weak(self, names: Sequence[str], values: Callable[[Effect, str], list[Effect]]
+              ) -> list[str]:
+        """Return which of some effects would not stand out at any of their values."""
+        model, kind = self.problem.model, self.problem.kind
+        tried = {name: values(present(model, catalogue()[name]), kind) for name in names}
+        changes = self.fitter.simulate(
+            [[one] for some in tried.values() for one in some]) - self.sets.base.predicted
+        sizes = iter(np.sqrt(np.mean(changes ** 2, axis=1)))
+        # What cannot be simulated may show.
+        shows = {name: any(not size < LEAST_CHANGE * self.sets.rmse_95
+                           for size in [next(sizes) for _ in some])
+                 for name, some in tried.items()}
+        return [name for name in names if not shows[name]]
 
     def _ranking(self, missing: Sequence[str], before: float) -> list[dict[str, Any]]:
         selection, problem = self.selection, self.problem
@@ -228,3 +243,16 @@ class _Verdict:
             rows, np.stack([fit.predicted - self.sets.base.predicted for fit in alone]),
             problem.weight_columns(selection.fixed))
         return verdict.in_order(rows, missing)
+
+
+def _strongest(effect: Effect, kind: str) -> list[Effect]:
+    """Return an effect with all parameters at the upper ends of their ranges."""
+    return [effect.with_values(**{
+        parameter.name: parameter.choices[-1] if parameter.choices else parameter.high
+        for parameter in effect.parameters if kind in parameter.kinds})]
+
+
+def _strongest_starts(effect: Effect, kind: str) -> list[Effect]:
+    """Return an effect where a fit may start, with its size at the upper end of its range."""
+    size = effect.parameters[0]
+    return [start.with_values(**{size.name: size.high}) for start in starts_of(effect, kind)]

@@ -69,6 +69,8 @@ class Diagnosis(Result):
         Whether an unexplained residual is like noise, but larger at some times than at others.
     resembles : list of str
         Effects that an unknown one is like; they explain it with implausible values.
+    explains_most : list of str
+        Effects that explain most of an unknown one, but leave more than the model may be off by.
     learned : dict or None
         A learned term that is offered instead.
     quantity : str
@@ -105,6 +107,7 @@ class Diagnosis(Result):
     signal: str
     uneven: bool = False
     resembles: list[str] = dataclasses.field(default_factory=list)
+    explains_most: list[str] = dataclasses.field(default_factory=list)
     learned: dict[str, Any] | None = None
     quantity: str = ''
     where: list[dict[str, Any]] = dataclasses.field(default_factory=list)

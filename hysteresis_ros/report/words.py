@@ -66,6 +66,10 @@ def _verdict(found: Diagnosis) -> str:
         if found.resembles:
             text = (f'Unknown: something acts here that is like {" with ".join(found.resembles)}, '
                     'but only values that are not physical would explain it.')
+        elif found.explains_most:
+            text = (f'Unknown: {" with ".join(found.explains_most)} would explain most of it, but '
+                    "what stays is more than the model's own error could be: something else acts "
+                    'here, or that acts otherwise than by its equation.')
         else:
             text = ('Unknown: something acts here that no effect of the catalogue explains '
                     f'({100.0 * found.unexplained:.0f} % of the mean square error).')
