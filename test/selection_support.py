@@ -4,7 +4,7 @@
 
 import dataclasses
 
-from model_support import runs
+from model_support import effect_of, runs
 import numpy as np
 
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -31,3 +31,8 @@ def selection(model, measured, names=TRIED, seed=0, **settings):
                       np.random.default_rng(seed), lambda items, total: items)
     found.run()
     return found
+
+
+def heavier(model):
+    """Return what is found where the arm carries 15 g more."""
+    return selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))

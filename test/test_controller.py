@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The controller: its voltages bring the model's own arm to the target, and its memory follows."""
 
+import dataclasses
 import json
 import math
 
@@ -56,6 +57,15 @@ def test_the_models_own_arm_reaches_every_target(names):
     assert not any(setpoint.saturated for setpoint in setpoints)
     assert max(abs(setpoint.error) for setpoint in setpoints) < 1e-9
     np.testing.assert_allclose(angles, targets, rtol=0.0, atol=1e-6)
+
+
+def test_a_sensor_without_a_memory_needs_no_state_of_rest():
+    """Nor the lengths from which that would follow."""
+    model = dataclasses.replace(bicep_model(['encoder_offset']), length_stage=None)
+    plain = dataclasses.replace(bicep_model(), length_stage=None)
+    offset = math.radians(model.effects[0].offset)
+    assert model.controller().reference(1.7) == pytest.approx(
+        plain.controller().reference(1.7 - offset))
 
 
 @pytest.mark.parametrize('seat', [-1.0, 0.5, 1.0])

@@ -7,7 +7,7 @@ import dataclasses
 from model_support import bicep_model, effect_of
 import numpy as np
 import pytest
-from selection_support import recording, selection, TRIED
+from selection_support import heavier, recording, selection, TRIED
 
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.diagnose import diagnose
@@ -25,8 +25,8 @@ def model():
 
 @pytest.fixture(scope='module')
 def payload(model):
-    """Return what is found where the arm carries 15 g more."""
-    return selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+    """Return what is found in an arm that carries more."""
+    return heavier(model)
 
 
 def test_the_planted_effect_is_the_most_probable_answer(payload):

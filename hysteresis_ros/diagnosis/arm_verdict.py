@@ -20,7 +20,6 @@ import numpy as np
 from hysteresis_ros.diagnosis import events, significance, verdict
 from hysteresis_ros.diagnosis.kept_strain import kept_strain
 from hysteresis_ros.diagnosis.observable import present
-from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.diagnosis.residual import unexplained_signal
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.effects import catalogue, Effect
@@ -205,17 +204,15 @@ class _Verdict:
         return [effect.id for effect in self._in_order(self.sets.fits[best].effects)]
 
     def _too_weak(self) -> dict[str, str]:
-        """Effects that even at the upper end of their range would not stand out here."""
-        weak = self._weak(self.selection.names, _strongest)
-        # Some show best at other values than the largest, as what creeps slowly does not.
-        weak = self._weak(weak, _strongest_starts)
+        """Effects that neither at the upper end of their range nor at a start stand out here."""
+        weak = self._weak(self.selection.names, self._strongest)
+        # Some show at other values than the largest: what creeps fast, or yields under little load.
+        weak = self._weak(weak, self._started)
         return {name: 'even a strong one would change less than the noise' for name in weak}
 
-    def _weak(self, names: Sequence[str], values: Callable[[Effect, str], list[Effect]]
-              ) -> list[str]:
+    def _weak(self, names: Sequence[str], values: Callable[[Effect], list[Effect]]) -> list[str]:
         """Return which of some effects would not stand out at any of their values."""
-        model, kind = self.problem.model, self.problem.kind
-        tried = {name: values(present(model, catalogue()[name]), kind) for name in names}
+        tried = {name: values(present(self.problem.model, catalogue()[name])) for name in names}
         changes = self.fitter.simulate(
             [[one] for some in tried.values() for one in some]) - self.sets.base.predicted
         sizes = iter(np.sqrt(np.mean(changes ** 2, axis=1)))
@@ -224,6 +221,17 @@ class _Verdict:
                            for size in [next(sizes) for _ in some])
                  for name, some in tried.items()}
         return [name for name in names if not shows[name]]
+
+    def _strongest(self, effect: Effect) -> list[Effect]:
+        """Return an effect with all parameters at the upper ends of their ranges."""
+        return [effect.with_values(**{
+            parameter.name: parameter.choices[-1] if parameter.choices else parameter.high
+            for parameter in effect.parameters if self.problem.kind in parameter.kinds})]
+
+    def _started(self, effect: Effect) -> list[Effect]:
+        """Return an effect where a fit may start, as it is and with the largest first parameter."""
+        first, starts = effect.parameters[0], self.selection.starts_of(effect, self.sets.base)
+        return [*starts, *(start.with_values(**{first.name: first.high}) for start in starts)]
 
     def _ranking(self, missing: Sequence[str], before: float) -> list[dict[str, Any]]:
         selection, problem = self.selection, self.problem
@@ -243,16 +251,3 @@ class _Verdict:
             rows, np.stack([fit.predicted - self.sets.base.predicted for fit in alone]),
             problem.weight_columns(selection.fixed))
         return verdict.in_order(rows, missing)
-
-
-def _strongest(effect: Effect, kind: str) -> list[Effect]:
-    """Return an effect with all parameters at the upper ends of their ranges."""
-    return [effect.with_values(**{
-        parameter.name: parameter.choices[-1] if parameter.choices else parameter.high
-        for parameter in effect.parameters if kind in parameter.kinds})]
-
-
-def _strongest_starts(effect: Effect, kind: str) -> list[Effect]:
-    """Return an effect where a fit may start, with its size at the upper end of its range."""
-    size = effect.parameters[0]
-    return [start.with_values(**{size.name: size.high}) for start in starts_of(effect, kind)]

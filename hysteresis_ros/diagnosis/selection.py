@@ -218,7 +218,7 @@ class Selection:
             If no start can be simulated.
         """
         others = [one for one in fit.effects if one.id not in effect.replaces]
-        starts = [*self._starts_of(effect, fit), effect]
+        starts = [*self.starts_of(effect, fit), effect]
         found = self.fitter.fit([[*others, start] for start in starts], self.fitting.metric,
                                 FIRST_STEPS, exact=False)
         found.sort(key=lambda one: -one.log_evidence)
@@ -228,7 +228,7 @@ class Selection:
         self.covariance.add(values)
         return self.fitter.refined(best, values)
 
-    def _starts_of(self, effect: Effect, fit: Fit) -> list[Effect]:
+    def starts_of(self, effect: Effect, fit: Fit) -> list[Effect]:
         """Return where to start an effect together with those of a fit."""
         problem = self.problem
         return starts_of(effect, problem.kind, problem.measured,
@@ -270,7 +270,7 @@ class Selection:
         starts: list[tuple[Effect, ...]] = []
         for names in probable[:self.settings.refits]:
             starts += itertools.product(*(
-                self._starts_of(effect, self.sets.base)
+                self.starts_of(effect, self.sets.base)
                 for effect in self.sets.fits[names].effects))
         self.fitting.begin(starts, self.settings.refits)
         self.fitting.refine(size)

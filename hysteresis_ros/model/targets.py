@@ -66,7 +66,7 @@ class Targets:
             If the arm cannot be held there; nothing is remembered of that target.
         """
         self._geometry.check_angle(theta)
-        if self._angle is None and self._chain.sensor:
+        if self._angle is None and any(effect.memory for effect in self._chain.sensor):
             self._begin()
         before = self._chain.save()
         try:
