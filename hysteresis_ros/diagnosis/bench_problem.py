@@ -18,6 +18,8 @@ from typing import Any, Literal, TYPE_CHECKING, TypeVar
 import numpy as np
 from scipy import sparse
 
+from hysteresis_ros.diagnosis.bench_design import (
+    Course, Design, Excitation, operator_with, weight_sizes)
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
@@ -26,9 +28,8 @@ from hysteresis_ros.identification.least_squares import SLACK, fit_weights
 from hysteresis_ros.identification.operators import smoothness
 from hysteresis_ros.identification.projection import ProjectedWeights
 from hysteresis_ros.kernels.load_play import follow
-from hysteresis_ros.kernels.shares import shares
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.operators import Preisach, cell_areas
+from hysteresis_ros.operators import Preisach
 from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
@@ -62,98 +63,12 @@ JUDGED = 2
 
 
 @dataclasses.dataclass
-class Design:
-    """
-    The least squares problem of H2's weights.
-
-    `shares` (n, K + 1) say what each weight, times the size of its cell, and last the bias
-    contribute to the response; `known` (n,) is the part without weights.
-    """
-
-    shares: np.ndarray
-    known: np.ndarray
-    nodes: np.ndarray
-
-    @property
-    def rows(self) -> np.ndarray:
-        """What each weight contributes to the response, shape (n, K)."""
-        return self.shares[:, :-1] * _scale(self.nodes)
-
-
-@dataclasses.dataclass
 class Solution:
     """Effects with the weights that suit the training rows best, and what both predict (n,)."""
 
     weights: ProjectedWeights
     predicted: np.ndarray
     phases: list[np.ndarray] | None
-
-
-@dataclasses.dataclass
-class Course:
-    """
-    What H2 is given, trial after trial, and what is done to its output.
-
-    `scales` and `known` (rows,) multiply the output above its least and are added to it.
-    """
-
-    excitation: Excitation
-    scales: np.ndarray
-    known: np.ndarray
-
-
-class Excitation:
-    """
-    What H2 is given, and what each of its weights makes of it.
-
-    Most effects change what is done to H2's output and not this.
-
-    Parameters
-    ----------
-    inputs : ndarray, shape (rows + trials,)
-        Trial after trial, each of which begins with the cold one.
-    ends : ndarray of int, shape (trials,)
-        Where each trial ends.
-    wanted : ndarray of bool, shape (rows + trials,)
-        Inputs whose output is judged.
-    """
-
-    def __init__(self, inputs: np.ndarray, ends: np.ndarray, wanted: np.ndarray) -> None:
-        self.inputs = inputs
-        self._ends, self._wanted = ends, wanted
-        self._nodes: dict[int, np.ndarray] = {}
-        self._shares: dict[int, np.ndarray] = {}
-
-    def nodes(self, levels: int) -> np.ndarray:
-        """Return a grid of equal intervals over the inputs, shape (levels + 1,)."""
-        if levels not in self._nodes:
-            low, high = self.inputs.min(), self.inputs.max()
-            margin = 1e-6 * max(high - low, 1e-12)
-            self._nodes[levels] = np.linspace(low - margin, high + margin, levels + 1)
-        return self._nodes[levels]
-
-    def shares(self, levels: int, scale: np.ndarray, columns: np.ndarray | None = None
-               ) -> np.ndarray:
-        """
-        Return what `kernels.shares` does, of all columns or of some that end with the bias.
-
-        Parameters
-        ----------
-        levels : int
-        scale : ndarray, shape (n,)
-        columns : ndarray of int, shape (C,), optional
-        """
-        nodes = self.nodes(levels)
-        if levels not in self._shares:
-            if columns is not None:
-                return shares(nodes, self.inputs, self._ends, self._wanted, scale, columns)
-            self._shares[levels] = shares(
-                nodes, self.inputs, self._ends, self._wanted, np.ones(len(scale)),
-                np.arange(len(_scale(nodes)) + 1))
-        found = self._shares[levels]
-        found = (found if columns is None else found[:, columns]) * scale[:, None]
-        found[:, -1] = 1.0
-        return found
 
 
 class BenchProblem(Problem):
@@ -327,7 +242,7 @@ class BenchProblem(Problem):
             design = self._design(effects, train=train)
             z = self._projected(design, train).z
             self._known_phases = self._phases_with(
-                effects, _stage(design.nodes, z[:-1] / _scale(design.nodes), 0.0))
+                effects, operator_with(design.nodes, z[:-1] / weight_sizes(design.nodes), 0.0))
             self._phases_of = key
         return self._known_phases
 
@@ -372,18 +287,18 @@ class BenchProblem(Problem):
             design = self._design(effects, levels, phases=phases)
             fit = fit_weights(
                 design.rows[rows], (self.measured - design.known)[rows], groups=groups,
-                scale=_scale(design.nodes), slack=SLACK,
+                scale=weight_sizes(design.nodes), slack=SLACK,
                 penalty=smoothness(design.nodes, reversible=True))
             if remaining:
                 # The share that these weights show is not quite that of those without the effect.
                 phases = self._phases_with(
-                    effects, _stage(design.nodes, fit.weights, fit.bias), phases)
+                    effects, operator_with(design.nodes, fit.weights, fit.bias), phases)
         return fit, design
 
     def stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray) -> Preisach:
         """Return H2 as rows to train on (n,) give it, with all effects of the model."""
         fit, design = self.fit_stage(effects, levels, train)
-        return _stage(design.nodes, fit.weights, fit.bias)
+        return operator_with(design.nodes, fit.weights, fit.bias)
 
     def simulate(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> np.ndarray:
         """Return the response of the judged rows, shape (n,), weights fitted to `train` (n,)."""
@@ -478,7 +393,7 @@ class BenchProblem(Problem):
         for other in finer:
             if other[0].held_out_rmse < (1.0 - WORTH) * fit.held_out_rmse:
                 fit, design = other
-        stage = _stage(design.nodes, fit.weights, fit.bias)
+        stage = operator_with(design.nodes, fit.weights, fit.bias)
         metrics = dict(self.model.metrics)
         metrics['length'] = {**metrics.get('length', {}), **left_out(
             fit, self.measured, self.trial, self.signals.get('load'))}
@@ -499,14 +414,3 @@ def _remember(found: dict[tuple, Entry], key: tuple, value: Entry) -> None:
     found[key] = value
     if len(found) > MOST_COURSES:
         del found[next(iter(found))]
-
-
-def _stage(nodes: np.ndarray, weights: np.ndarray, bias: float) -> Preisach:
-    """Return the operator with weights of shape (K + N,); `bias` is its least output."""
-    count = len(cell_areas(nodes))
-    return Preisach(nodes, weights[:count], bias + float(weights @ _scale(nodes)), weights[count:])
-
-
-def _scale(nodes: np.ndarray) -> np.ndarray:
-    """Sizes of the cells and, for the reversible weights, of the intervals, shape (K + N,)."""
-    return np.append(cell_areas(nodes), np.diff(nodes))

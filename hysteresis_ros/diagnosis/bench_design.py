@@ -1,0 +1,110 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What H2 is given on a bench, and what each of its weights makes of that."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from hysteresis_ros.kernels.shares import shares
+from hysteresis_ros.operators import cell_areas, Preisach
+
+
+def weight_sizes(nodes: np.ndarray) -> np.ndarray:
+    """Return sizes of cells and, for the reversible weights, of intervals, shape (K + N,)."""
+    return np.append(cell_areas(nodes), np.diff(nodes))
+
+
+def operator_with(nodes: np.ndarray, weights: np.ndarray, bias: float) -> Preisach:
+    """Return the operator with weights of shape (K + N,); `bias` is its least output."""
+    count = len(cell_areas(nodes))
+    sizes = weight_sizes(nodes)
+    return Preisach(nodes, weights[:count], bias + float(weights @ sizes), weights[count:])
+
+
+class Excitation:
+    """
+    What H2 is given, and what each of its weights makes of it.
+
+    Most effects change what is done to H2's output and not this.
+
+    Parameters
+    ----------
+    inputs : ndarray, shape (rows + trials,)
+        Trial after trial, each of which begins with the cold one.
+    ends : ndarray of int, shape (trials,)
+        Where each trial ends.
+    wanted : ndarray of bool, shape (rows + trials,)
+        Inputs whose output is judged.
+    """
+
+    def __init__(self, inputs: np.ndarray, ends: np.ndarray, wanted: np.ndarray) -> None:
+        self.inputs = inputs
+        self._ends, self._wanted = ends, wanted
+        self._nodes: dict[int, np.ndarray] = {}
+        self._shares: dict[int, np.ndarray] = {}
+
+    def nodes(self, levels: int) -> np.ndarray:
+        """Return a grid of equal intervals over the inputs, shape (levels + 1,)."""
+        if levels not in self._nodes:
+            low, high = self.inputs.min(), self.inputs.max()
+            margin = 1e-6 * max(high - low, 1e-12)
+            self._nodes[levels] = np.linspace(low - margin, high + margin, levels + 1)
+        return self._nodes[levels]
+
+    def shares(self, levels: int, scale: np.ndarray, columns: np.ndarray | None = None
+               ) -> np.ndarray:
+        """
+        Return what `kernels.shares` does, of all columns or of some that end with the bias.
+
+        Parameters
+        ----------
+        levels : int
+        scale : ndarray, shape (n,)
+        columns : ndarray of int, shape (C,), optional
+        """
+        nodes = self.nodes(levels)
+        if levels not in self._shares:
+            if columns is not None:
+                return shares(nodes, self.inputs, self._ends, self._wanted, scale, columns)
+            self._shares[levels] = shares(
+                nodes, self.inputs, self._ends, self._wanted, np.ones(len(scale)),
+                np.arange(len(weight_sizes(nodes)) + 1))
+        found = self._shares[levels]
+        found = (found if columns is None else found[:, columns]) * scale[:, None]
+        found[:, -1] = 1.0
+        return found
+
+
+@dataclasses.dataclass
+class Course:
+    """
+    What H2 is given, trial after trial, and what is done to its output.
+
+    `scales` and `known` (rows,) multiply the output above its least and are added to it.
+    """
+
+    excitation: Excitation
+    scales: np.ndarray
+    known: np.ndarray
+
+
+@dataclasses.dataclass
+class Design:
+    """
+    The least squares problem of H2's weights.
+
+    `shares` (n, K + 1) say what each weight, times the size of its cell, and last the bias
+    contribute to the response; `known` (n,) is the part without weights.
+    """
+
+    shares: np.ndarray
+    known: np.ndarray
+    nodes: np.ndarray
+
+    @property
+    def rows(self) -> np.ndarray:
+        """What each weight contributes to the response, shape (n, K)."""
+        return self.shares[:, :-1] * weight_sizes(self.nodes)
