@@ -115,9 +115,10 @@ def wandering_voltage(rows, seed=0):
 
 
 def runs(model, trials=3, rows=ROWS, seed=0, dt=30.0, sizes=None):
-    """Return an arm run of some settled trials that the model itself has made."""
+    """Return an arm run of some settled trials, over all voltages, that the model has made."""
     sizes = sizes or [rows] * trials
-    voltage = np.concatenate([
+    share = model.ranges['voltage'][1] / 6.0
+    voltage = share * np.concatenate([
         wandering_voltage(400, seed + trial)[::400 // size][:size]
         for trial, size in enumerate(sizes)])
     trial = np.repeat(np.arange(float(len(sizes))), sizes)

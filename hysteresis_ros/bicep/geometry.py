@@ -91,6 +91,21 @@ class BicepGeometry:
             raise ParameterError(
                 f'geometry: muscle_count must be a whole number, not {self.muscle_count!r}')
 
+    @property
+    def moved_mass(self) -> float:
+        """Mass of payload and forearm [kg]."""
+        return self.payload_mass + self.forearm_mass
+
+    @property
+    def largest_moment(self) -> float:
+        """Moment of gravity on the level forearm [N m]."""
+        return self.gravity * self.forearm_length * (self.payload_mass + self.forearm_mass / 2.0)
+
+    @property
+    def moment_of_inertia(self) -> float:
+        """Moment of inertia of payload and forearm about the pivot [kg m^2]."""
+        return self.forearm_length ** 2 * (self.payload_mass + self.forearm_mass / 3.0)
+
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any], source: str = 'geometry') -> 'BicepGeometry':
         """

@@ -19,7 +19,7 @@ from hysteresis_ros.operators.compiled import CompiledOperator
 if TYPE_CHECKING:
     from hysteresis_ros.model.chain import Chain
 
-# Compliance [m/N] of a wire whose own is not known.
+# Compliance [m/N] of a wire whose own is not known, if it is one of the paper's.
 COMPLIANCE = 2e-4
 # Loads at which the factor on the strain and the loop's width are laid out, up to this many times
 # the bench's mean.
@@ -63,7 +63,8 @@ def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
         if plays:
             widths = np.interp(even, inside, chain.loop_width(loads))
     own = chain.compliance()
-    return (Wires(table, operator.output_range[0], offsets, own or COMPLIANCE,
+    typical = COMPLIANCE * chain.surroundings.over_paper('compliance')
+    return (Wires(table, operator.output_range[0], offsets, own or typical,
                   1e-10 * (operator.upper - operator.lower), scales, widths, lightest, spacing,
                   own > 0.0, kept), operators, memories)
 

@@ -47,7 +47,7 @@ def described(effect: type[Effect]) -> dict[str, Any]:
     return {
         'effect': effect.id, 'stage': effect.stage, 'sentence': effect.sentence,
         'equation': effect.equation, 'source': effect.source,
-        'parameters': {p.name: {'unit': p.unit, 'low': p.low, 'high': p.high,
+        'parameters': {p.name: {'unit': p.unit, 'low': p.low, 'high': p.high, 'scale': p.scale,
                                 'description': p.description} for p in effect.describe(None)},
         'shows_in': effect.shows_in, 'experiment': effect.experiment,
         'confused_with': list(effect.confused_with), 'kinds': list(effect.kinds),
@@ -81,7 +81,9 @@ def explained(effect: type[Effect]) -> str:
     lines += ['', 'parameters:']
     for parameter in effect.describe(None):
         signs = ' (either sign)' if parameter.both_signs else ''
-        span = f'{parameter.low:g} to {parameter.high:g} {parameter.unit}{signs}'
+        scale = (f" for the paper's muscle and arm, in proportion to {parameter.scale}"
+                 if parameter.scale else '')
+        span = f'{parameter.low:g} to {parameter.high:g} {parameter.unit}{signs}{scale}'
         lines += textwrap.wrap(f'{parameter.name}: {span}; {parameter.description}', columns,
                                initial_indent='  ', subsequent_indent='    ')
     return '\n'.join(lines)

@@ -25,7 +25,7 @@ class AmbientTemperature(ThermalEffect):
     smallest_change = 0.5
     parameters = (
         Parameter('gain', 'V^2/K', 'd1/d2: drive squared that one kelvin stands for', 0.02, 2.0,
-                  0.0, (0.2, 0.6), log=True),
+                  0.0, (0.2, 0.6), log=True, scale='drive squared'),
         Parameter('reference', 'degC', 'ambient temperature T0 of the bench', 5.0, 40.0, 25.0,
                   (23.0,)),)
 
@@ -35,9 +35,9 @@ class AmbientTemperature(ThermalEffect):
     @classmethod
     def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Give the reference the range that was recorded on the bench, where it was."""
-        gain, reference = cls.parameters
+        gain, reference = super().describe(surroundings)
         if surroundings is None or surroundings.ambient is None:
-            return cls.parameters
+            return gain, reference
         low, high = surroundings.ambient
         middle = 0.5 * (low + high)
         return gain, dataclasses.replace(
@@ -70,16 +70,14 @@ class AmbientDrift(ThermalEffect):
     parameters = (
         # A room differs by up to 20 K, of about 0.4 V^2 each, and settles within minutes.
         Parameter('offset', 'V^2', 'what the air at the start adds against the bench', 0.0, 8.0,
-                  0.0, (0.0,), both_signs=True),
+                  0.0, (0.0,), both_signs=True, scale='drive squared'),
         Parameter('rate', 'V^2/10 min', 'change of that', 0.05, 12.0, 0.0, (-1.0, 1.0),
-                  both_signs=True),
+                  both_signs=True, scale='drive squared'),
         Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.05, 8.0, 0.0, (0.0,),
-                  both_signs=True),)
+                  both_signs=True, scale='drive squared'),)
     together = ('rate', 'curvature')
 
     CLOCK_UNIT = 600.0
-    # What all terms are together, at any time, and their change over a recording [V^2]: 20 K.
-    LARGEST_TOTAL = 8.0
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Add a slow function of the time since the recording began."""
@@ -94,5 +92,7 @@ class AmbientDrift(ThermalEffect):
         """Name also the total, where no room is as warm or changes as much in a recording."""
         total = self.total(np.linspace(0.0, duration, 101))
         size = max(float(np.max(np.abs(total))), float(np.ptp(total)))
+        # No more than the air at the start: 20 K.
+        offset = self.parameters[0]
         return super().implausible(slack, duration) + (
-            ['total'] if size > self.LARGEST_TOTAL * (1.0 + slack) else [])
+            ['total'] if size > offset.high * (1.0 + slack) else [])

@@ -13,10 +13,11 @@ a controller can undo it. Effects with dynamics or memory of their own carry it 
 """
 
 import abc
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 import copy
 import dataclasses
 import math
+import re
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
@@ -57,6 +58,9 @@ class Parameter:
         neutral one is the simplest form, and stays where it was chosen.
     limits : (float, float), optional
         What the value cannot pass by its nature; default the range widened.
+    scale : str
+        What of muscle or arm, a key of `SCALES`, range and starts are in proportion to; they are
+        those of the paper's. They hold for any muscle if it is empty.
     """
 
     name: str
@@ -72,6 +76,20 @@ class Parameter:
     kinds: tuple[str, ...] = ('arm', 'bench')
     limits: tuple[float, float] | None = None
     form: bool = False
+    scale: str = ''
+
+    def of(self, surroundings: 'Surroundings | None') -> 'Parameter':
+        """Return it with the unit, range and starts that suit a muscle; for none, as it is."""
+        if surroundings is None or not self.scale:
+            return self
+        factor = surroundings.over_paper(self.scale)
+        limits = self.limits and (factor * self.limits[0], factor * self.limits[1])
+        square, plain = DRIVE_UNITS.get(surroundings.drive, ('V^2', 'V'))
+        return dataclasses.replace(
+            self, low=factor * self.low, high=factor * self.high, limits=limits,
+            starts=tuple(factor * start for start in self.starts),
+            unit=(self.unit.replace('V^2', square) if 'V^2' in self.unit
+                  else re.sub(r'\bV\b', plain, self.unit)))
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -129,7 +147,9 @@ class Surroundings(NamedTuple):
     length, and `least` the response of H2 where it has transformed altogether. `muscles` is the
     number of parallel muscles that lift the arm, 1 without an arm. `operator` is the kind of H2.
     `ambient` is the range of the ambient temperature on the bench [degC], None where it was not
-    recorded.
+    recorded. `mass` is that of payload and forearm [kg], `moment` their largest moment about the
+    pivot [N m], `inertia` their moment of inertia [kg m^2] and `lever` the distance from pivot to
+    clamp [m], NaN without an arm.
     """
 
     length: float
@@ -147,6 +167,37 @@ class Surroundings(NamedTuple):
     muscles: int = 1
     operator: str = 'preisach'
     ambient: tuple[float, float] | None = None
+    mass: float = math.nan
+    moment: float = math.nan
+    inertia: float = math.nan
+    lever: float = math.nan
+
+    def over_paper(self, scale: str) -> float:
+        """Return one of the `SCALES` over that of the paper's muscle and arm, 1 if not known."""
+        share = SCALES[scale](self) / SCALES[scale](PAPER)
+        return share if 0.0 < share < math.inf else 1.0
+
+
+# The muscle and arm for which ranges of parameters are written down: the wires of the paper on a
+# bench of 3 to 5 N and 0 to 6 V, and the arm of `config/bicep.yaml`.
+PAPER = Surroundings(0.27, 4.116, 36.0, 0.016, drive_range=6.0, mass=0.14,
+                     moment=9.81 * 0.3 * (0.1 + 0.04 / 2.0), inertia=0.3 ** 2 * (0.1 + 0.04 / 3.0),
+                     lever=0.017)
+# What a range may be in proportion to.
+SCALES: dict[str, Callable[[Surroundings], float]] = {
+    'length': lambda own: own.length,
+    'compliance': lambda own: own.length / (own.load or math.nan),
+    'strain per load': lambda own: 1.0 / (own.load or math.nan),
+    'drive': lambda own: math.sqrt(own.full_drive_squared),
+    'drive squared': lambda own: own.full_drive_squared,
+    'load per drive squared': lambda own: own.load / (own.full_drive_squared or math.nan),
+    'mass': lambda own: own.mass,
+    'moment': lambda own: own.moment,
+    'inertia': lambda own: own.inertia,
+    'lever': lambda own: own.lever,
+}
+# Units of the drive's square and of the drive where these are not V^2 and V.
+DRIVE_UNITS = {'current': ('A^2', 'A'), 'power': ('W', 'W')}
 
 
 class Effect(abc.ABC):
@@ -230,7 +281,7 @@ class Effect(abc.ABC):
     @classmethod
     def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Return the parameters with the units and ranges that suit the muscle."""
-        return cls.parameters
+        return tuple(parameter.of(surroundings) for parameter in cls.parameters)
 
     def __copy__(self) -> 'Effect':
         """Return one with the same values, and a past of its own from now on."""

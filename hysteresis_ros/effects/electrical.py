@@ -65,7 +65,7 @@ class PwmDeadZone(ElectricalEffect):
     confused_with = ('ambient_drift',)
     parameters = (
         Parameter('Vd', 'V', 'largest voltage that has no effect', 0.05, 1.5, 0.0, (0.3, 1.0),
-                  log=True),)
+                  log=True, scale='drive'),)
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Cut the lower end off and stretch the rest."""

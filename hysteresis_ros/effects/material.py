@@ -13,7 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Effect, Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.base import (
+    Effect, Inputs, PAPER, Parameter, Surroundings, Values)
 from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.kernels.creep import fade, relax
 from hysteresis_ros.kernels.play import follow
@@ -45,26 +46,28 @@ class StressDependence(MaterialEffect):
     FOLLOWS = Parameter('follows', '1', 'share by which 1 / C is in proportion to the strain that '
                         'grows with the load, as of Clausius-Clapeyron', 0.0, 1.0, 0.0, (0.5,),
                         limits=(0.0, 1.0), kinds=('bench',), form=True)
-    # Load per drive squared: of a 0.2 mm wire 5 to 15 MPa/K at 2 to 12 K/V^2, of others not known.
-    RANGES: ClassVar[dict[tuple[str, str | None], tuple[str, float, float]]] = {
-        ('voltage', 'force'): ('N/V^2', 0.2, 6.0), ('current', 'force'): ('N/A^2', 1.0, 1e3),
-        ('temperature', 'stress'): ('MPa/K', 5.0, 15.0),
-        ('temperature', 'force'): ('N/K', 0.01, 100.0)}
+    # Unit, range and scale. Of a 0.2 mm wire 5 to 15 MPa/K at 2 to 12 K/V^2, of others not known.
+    RANGES: ClassVar[dict[tuple[str, str | None], tuple[str, float, float, str]]] = {
+        ('voltage', 'force'): ('N/V^2', 0.2, 6.0, 'load per drive squared'),
+        ('current', 'force'): ('N/A^2', 1.0, 1e3, ''),
+        ('temperature', 'stress'): ('MPa/K', 5.0, 15.0, ''),
+        ('temperature', 'force'): ('N/K', 0.01, 100.0, '')}
     PREFIX = {'MPa/K': 1e6}
 
     @classmethod
     def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Give C the unit and range of this muscle's load and drive."""
         if surroundings is None:
-            surroundings = Surroundings(1.0, 1.0, 1.0, 1.0)
-        scale = (surroundings.load or 1.0) / (surroundings.full_drive_squared or 1.0)
-        unit, low, high = cls.RANGES.get((surroundings.drive, surroundings.load_name),
-                                         ('load/drive squared', 1e-3 * scale, 1e3 * scale))
+            surroundings = PAPER
+        known = (surroundings.load or 1.0) / (surroundings.full_drive_squared or 1.0)
+        unit, low, high, scale = cls.RANGES.get(
+            (surroundings.drive, surroundings.load_name),
+            ('load/drive squared', 1e-3 * known, 1e3 * known, ''))
         starts = tuple(float(value) for value in np.geomspace(low, high, 5)[1:-1])
         return (Parameter('C', unit,
                           'load that shifts the transformation by one unit of drive squared',
-                          low, high, 0.0, starts, log=True, kinds=('bench',)), cls.FOLLOWS,
-                cls.SHIFT)
+                          low, high, 0.0, starts, log=True, kinds=('bench',),
+                          scale=scale).of(surroundings), cls.FOLLOWS, cls.SHIFT)
 
     parameters = (FOLLOWS, SHIFT)
 
@@ -170,14 +173,14 @@ class SeriesCompliance(MaterialEffect):
     universal = True
     parameters = (
         Parameter('compliance', 'mm/N', 'elongation per load', 0.005, 0.65, 0.0, (0.02, 0.1),
-                  log=True),)
+                  log=True, scale='compliance'),)
 
     # Crimps and cable of 2 kN/m and more, and the wire itself with about 0.15 mm/N.
     UNITS = {'mm/N': 1e-3, '1/GPa': 1e-9, '%/N': 1e-2, 'mm/MPa': 1e-9}
-    # The same wire of 0.27 m and 0.2 mm in the units of other tables.
-    RANGES = {('strain', 'stress'): ('1/GPa', 'strain per stress', 0.004, 0.3),
-              ('strain', 'force'): ('%/N', 'strain per load', 0.002, 0.2),
-              ('length', 'stress'): ('mm/MPa', 'elongation per stress', 0.0002, 0.02)}
+    # The same wire of 0.27 m and 0.2 mm in the units of other tables, with the range's scale.
+    RANGES = {('strain', 'stress'): ('1/GPa', 'strain per stress', 0.004, 0.3, ''),
+              ('strain', 'force'): ('%/N', 'strain per load', 0.002, 0.2, 'strain per load'),
+              ('length', 'stress'): ('mm/MPa', 'elongation per stress', 0.0002, 0.02, 'length')}
 
     @classmethod
     def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
@@ -186,10 +189,11 @@ class SeriesCompliance(MaterialEffect):
             return cls.parameters
         kind = surroundings.response, surroundings.load_name
         if kind not in cls.RANGES:
-            return cls.parameters
-        unit, meaning, low, high = cls.RANGES[kind]
+            return super().describe(surroundings)
+        unit, meaning, low, high, scale = cls.RANGES[kind]
         starts = float(np.sqrt(low * high)), 0.3 * high
-        return (Parameter('compliance', unit, meaning, low, high, 0.0, starts, log=True),)
+        return (Parameter('compliance', unit, meaning, low, high, 0.0, starts, log=True,
+                          scale=scale).of(surroundings),)
 
     def stretch(self, load: Values, surroundings: Surroundings) -> Values:
         """Return the elastic elongation."""
@@ -458,7 +462,7 @@ class Slack(MaterialEffect):
     experiment = 'sweep the preload'
     confused_with = ('r_phase', 'geometry_error')
     parameters = (
-        Parameter('Ls', 'mm', 'dead length', 0.1, 5.0, 0.0, (0.5, 2.0), log=True),)
+        Parameter('Ls', 'mm', 'dead length', 0.1, 5.0, 0.0, (0.5, 2.0), log=True, scale='length'),)
 
     def stretch(self, load: Values, surroundings: Surroundings) -> Values:
         """Return the dead length, the same under any load; that a wire cannot push holds anyway."""
@@ -477,9 +481,9 @@ class UnequalMuscles(MaterialEffect):
     confused_with = ('slack', 'geometry_error')
     parameters = (
         Parameter('shorter', 'mm', 'how much the shortest lacks against the middle one', 0.0, 8.0,
-                  0.0, (0.5, 2.0)),
+                  0.0, (0.5, 2.0), scale='length'),
         Parameter('longer', 'mm', 'how much the longest exceeds the middle one', 0.0, 8.0, 0.0,
-                  (0.5, 2.0)),)
+                  (0.5, 2.0), scale='length'),)
 
     @property
     def offsets(self) -> tuple[float, ...]:     # type: ignore[override]

@@ -29,7 +29,7 @@ class CoulombFriction(MechanismEffect):
     confused_with = ('backlash',)
     parameters = (
         Parameter('tau_c', 'N m', 'moment of friction', 0.001, 0.15, 0.0, (0.01, 0.05),
-                  log=True),)
+                  log=True, scale='moment'),)
 
     def resistance(self) -> tuple[float, float, float]:
         """Return the friction's moment."""
@@ -50,7 +50,7 @@ class ViscousFriction(MechanismEffect):
     invertible = False
     parameters = (
         Parameter('b', 'N m s/rad', 'moment per angular velocity', 0.001, 4.0, 0.0, (0.05, 1.0),
-                  log=True),)
+                  log=True, scale='moment'),)
 
     def resistance(self) -> tuple[float, float, float]:
         """Return the viscous coefficient."""
@@ -72,9 +72,9 @@ class Inertia(MechanismEffect):
     invertible = False
     parameters = (
         Parameter('I', 'kg m^2', 'moment of inertia about the pivot', 0.001, 0.1, 0.0,
-                  (0.006, 0.015, 0.04), log=True),
+                  (0.006, 0.015, 0.04), log=True, scale='inertia'),
         Parameter('b', 'N m s/rad', 'moment per angular velocity, by which the ringing dies away',
-                  0.001, 4.0, 0.0, (0.05,), log=True),)
+                  0.001, 4.0, 0.0, (0.05,), log=True, scale='moment'),)
 
     def resistance(self) -> tuple[float, float, float]:
         """Return viscous coefficient and moment of inertia."""
@@ -114,7 +114,7 @@ class PayloadError(MechanismEffect):
     confused_with = ('frame_tilt', 'supply_sag')
     parameters = (
         Parameter('dm', 'g', 'payload above the assumed one', 5.0, 100.0, 0.0, (-20.0, 20.0),
-                  both_signs=True),)
+                  both_signs=True, scale='mass'),)
 
     def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Add the weight's moment."""
@@ -133,7 +133,8 @@ class ClampMass(MechanismEffect):
     experiment = 'run the arm without a payload'
     confused_with = ('geometry_error',)
     parameters = (
-        Parameter('moment', 'g m', 'mass times distance m_c r_c', 0.1, 2.5, 0.0, (0.5,), log=True),
+        Parameter('moment', 'g m', 'mass times distance m_c r_c', 0.1, 2.5, 0.0, (0.5,), log=True,
+                  scale='moment'),
         Parameter('phi', 'rad', 'direction of its centre against the forearm', 0.0, math.pi, 0.0,
                   (0.0, 1.5), both_signs=True),)
 
@@ -156,11 +157,11 @@ class GeometryError(MechanismEffect):
     # y and z0 are one number in Eq. 21 to first order, so only their difference is fitted.
     parameters = (
         Parameter('dx', 'mm', 'clamp further out than assumed', 0.5, 5.0, 0.0, (-1.0, 1.0),
-                  both_signs=True),
+                  both_signs=True, scale='lever'),
         Parameter('da', 'mm', 'clamp higher than assumed', 0.5, 5.0, 0.0, (0.0,),
-                  both_signs=True),
+                  both_signs=True, scale='lever'),
         Parameter('dz', 'mm', 'anchor higher, or muscle shorter, than assumed', 0.5, 5.0, 0.0,
-                  (0.0,), both_signs=True),)
+                  (0.0,), both_signs=True, scale='lever'),)
     together = ('dx', 'da', 'dz')
 
     def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
@@ -195,7 +196,7 @@ class EndStop(MechanismEffect):
         Parameter('side', '1', '1: the arm cannot go above the stop, -1: not below it', -1.0, 1.0,
                   0.0, (1.0, -1.0), choices=(-1.0, 1.0)),
         Parameter('stiffness', 'N m/rad', 'stiffness of the stop', 1.0, 1000.0, 0.0, (5.0,),
-                  log=True),)
+                  log=True, scale='moment'),)
 
     def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
         """Where the response ends there may be a stop."""

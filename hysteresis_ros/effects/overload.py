@@ -31,7 +31,7 @@ class Overload(MaterialEffect):
                   1.0, (0.7, 1.1, 1.4), log=True),
         # Of 0.2 mm and 0.27 m with a hardening modulus of 0.4 to 80 GPa.
         Parameter('compliance', 'mm/N', 'residual elongation per load beyond, 1 / K', 0.1, 20.0,
-                  0.0, (1.5, 6.0), log=True),)
+                  0.0, (1.5, 6.0), log=True, scale='compliance'),)
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:

@@ -125,12 +125,15 @@ class MuscleModel:
         # The force table was measured at the resting length.
         rest_load = self.force_stage.output_range[0] if self.force_stage is not None else 0.0
         least = self.length_stage.output_range[0] if self.length_stage is not None else 0.0
+        arm = self.geometry
+        scales = (arm.moved_mass, arm.largest_moment, arm.moment_of_inertia,
+                  arm.clamp_distance) if arm else ()
         return Surroundings(length, self.mean_load, float(bare.to_drive_squared(largest)), span,
                             self.drive, self.load_name, self.response, self.cold_drive,
                             self.drive_range, self.sign, rest_load, least,
-                            int(self.geometry.muscle_count) if self.geometry else 1,
+                            int(arm.muscle_count) if arm else 1,
                             self.length_stage.kind if self.length_stage is not None else '',
-                            self.ranges.get('ambient_temperature'))
+                            self.ranges.get('ambient_temperature'), *scales)
 
     def with_effects(self, effects: Sequence[Effect]) -> MuscleModel:
         """Return a copy with other effects and the same operators."""
