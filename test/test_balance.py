@@ -14,6 +14,7 @@ from hysteresis_ros.bicep.balance import ArmBalance, statics_of
 from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.bicep.wires import COMPLIANCE
 from hysteresis_ros.effects import MaterialEffect
+from hysteresis_ros.effects.base import PAPER
 from hysteresis_ros.kernels.formation import LOAD
 from hysteresis_ros.operators import Linear
 from model_support import bicep_model, effect_of, GEOMETRY
@@ -359,14 +360,36 @@ def test_equal_muscles_in_parallel_are_one(names):
             assert three.output == pytest.approx(one.output, abs=1e-7)
 
 
+@pytest.mark.parametrize('more', [(), ('transformation_slopes',), ('cable_friction',)])
+def test_friction_that_is_larger_at_rest_holds_longer_and_lets_go_to_the_same_place(more):
+    """On a steady way up, which leaves the same memory: it moves in jumps of half its friction."""
+    models = [MODEL.with_effects([effect_of(MODEL, 'coulomb_friction', tau_c=0.02, rest=share),
+                                  *(effect_of(MODEL, name) for name in more)])
+              for share in (0.0, 0.5)]
+    arms = [model.balance(model.chain()) for model in models]
+    for arm in arms:
+        arm.settle(0.5)
+    inputs = np.arange(4.0, 8.0, 0.005)
+    angles = np.array([[arm.step(x, 30.0) for arm in arms] for x in inputs])
+    moves = np.flatnonzero(np.diff(angles[:, 1])) + 1
+    assert 3 < len(moves) < 0.2 * np.count_nonzero(np.diff(angles[:, 0]))
+    np.testing.assert_allclose(angles[moves, 1], angles[moves, 0], rtol=0.0, atol=1e-7)
+    if not more:
+        # Half the friction more, before it lets go.
+        leverage = GEOMETRY.muscle_count * GEOMETRY.moment_arm(angles[moves[:-1], 1])
+        assert np.diff(inputs[moves]) == pytest.approx(0.5 * 0.02 / leverage, abs=0.006)
+
+
 @pytest.mark.parametrize('names, tolerance', [
     (('inertia',), 0.05), (('inertia', 'series_compliance'), 1e-4),
     (('viscous_friction', 'series_compliance'), 1e-5)])
 def test_equal_muscles_swing_like_one(names, tolerance):
-    one = balance(*names)
-    model = MODEL.with_effects([*(effect_of(MODEL, name) for name in names), Wires(0., 0., 0.)])
-    three = model.balance(model.chain())
-    three.settle(0.5)
+    # Wires of the paper.
+    model = bicep_model(names, mean_load=PAPER.load)
+    one, three = (made.balance(made.chain()) for made in (
+        model, model.with_effects([*model.effects, Wires(0., 0., 0.)])))
+    for arm in (one, three):
+        arm.settle(0.5)
     both = np.array([[arm.step(x, 0.1) for arm in (one, three)]
                      for x in np.repeat([3.0, 6.0, 4.0, 7.0, 5.0], 40)])
     assert np.max(np.abs(np.diff(both))) < tolerance * np.ptp(both[:, 0])
@@ -380,7 +403,7 @@ def test_unequal_muscles_share_the_load_of_brute_force(elastic, strain, g):
     offsets = (-0.8e-3, 0.0, 1.2e-3)
     names = {'unequal_muscles': {'shorter': 0.8, 'longer': 1.2}, 'stress_dependent_strain': strain,
              'transformation_slopes': {'g': g}}
-    compliance = COMPLIANCE
+    compliance = COMPLIANCE * MODEL.surroundings.over_paper('compliance')
     if elastic:
         names['series_compliance'] = {'compliance': elastic}
         compliance = 1e-3 * elastic

@@ -27,7 +27,8 @@ def fitter_of(model, measured, jobs=1):
     problem = problem_for(model, [measured], jobs=jobs)
     drive = problem.signals['drive'] / 6.0
     discrepancy = Discrepancy(np.full((len(drive), 1), SIZE), drive[:, None] / 0.45,
-                              np.zeros((len(drive), 0)), np.zeros(len(drive)))
+                              np.zeros((len(drive), 0)), np.zeros(len(drive)),
+                              np.zeros((len(drive), 0)))
     covariance = Covariance(discrepancy, problem.clock, problem.trial, NOISE, np.inf, 0.3)
     covariance.add(covariance.start(0.1, 0.3))
     return Fitter(problem, covariance, lambda fit: discrepancy)
@@ -194,8 +195,7 @@ def test_a_fit_is_polished_under_the_covariance_that_it_is_judged_by(loaded, mon
     problem = loaded.problem
     drive = problem.signals['drive'] / 6.0
     parts = np.where(drive > 0.5, 10.0, 0.1)[:, None] * SIZE
-    other = Discrepancy(parts, drive[:, None] / 0.45, np.zeros((len(drive), 0)),
-                        np.zeros(len(drive)))
+    other = dataclasses.replace(loaded.covariance.discrepancy, parts=parts)
     monkeypatch.setattr(loaded, 'discrepancy', lambda fit: other)
     start = [[neutral(loaded, 'supply_sag')]]
     fit, = loaded.fit(start, loaded.covariance.points[0])

@@ -12,6 +12,7 @@ import pytest
 from hysteresis_ros.effects import (
     catalogue, DriveEffect, Effect, effect_class, Inputs, MaterialEffect, Parameter, SensorEffect,
     STAGES)
+from hysteresis_ros.effects.base import PAPER
 from hysteresis_ros.effects.catalogue import ENTRY_POINT_GROUP
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.model import Simulator
@@ -122,7 +123,7 @@ def test_effect_says_what_it_is(name):
 
 @pytest.mark.parametrize('effect, name', RANGES)
 def test_parameter_has_its_unit_and_plausible_range(effect, name):
-    model = bicep_model()
+    model = bicep_model(mean_load=PAPER.load)
     parameter = {p.name: p for p in effect_of(model, effect).parameters}[name]
     unit, low, high = RANGES[effect, name]
     assert (parameter.unit, parameter.low, parameter.high) == (

@@ -12,6 +12,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
+from hysteresis_ros.effects.base import PAPER
 from hysteresis_ros.kernels import grid, trial
 from hysteresis_ros.kernels.jit import remember_types
 from hysteresis_ros.kernels.plain import Plain
@@ -82,7 +83,8 @@ def test_compiled_and_uncompiled_kernels_agree(root, tmp_path):
 @pytest.mark.parametrize('dt', [0.1, 30.0])
 @pytest.mark.parametrize('names', ARMS)
 def test_the_compiled_arm_is_the_reference_in_plain_python(names, dt):
-    model = bicep_model(names)
+    # Whose wires are those of the paper.
+    model = bicep_model(names, mean_load=PAPER.load)
     x = 2.0 * VOLTAGE
     offset = 1e-4 * np.sin(np.arange(len(x)))
     rest, angles, _, _ = model.balance(model.chain()).run(

@@ -346,7 +346,10 @@ def test_muscle_says_what_scales_effects_refer_to():
         'length': 0.27, 'load': 3.0, 'full_drive_squared': 36.0, 'span': pytest.approx(0.0205),
         'drive': 'voltage', 'load_name': 'force', 'response': 'length', 'cold': 0.0,
         'drive_range': 6.0, 'sign': -1, 'rest_load': 0.5, 'least': pytest.approx(-0.0205),
-        'muscles': 3, 'operator': 'preisach', 'ambient': None}
+        'muscles': 3, 'operator': 'preisach', 'ambient': None,
+        # 100 g at the end of a forearm of 0.3 m and 40 g, and a clamp at 17 mm.
+        'mass': pytest.approx(0.14), 'moment': pytest.approx(9.81 * 0.3 * 0.12),
+        'inertia': pytest.approx(0.1 * 0.3 ** 2 + 0.04 * 0.3 ** 2 / 3.0), 'lever': 0.017}
     hot = bicep_model(drive='temperature', response='strain', geometry=None, sign=1,
                       ranges={'temperature': (20.0, 150.0), 'strain': (0.0, 0.04)}).surroundings
     assert (hot.length, hot.full_drive_squared, hot.cold, hot.drive_range, hot.sign) == (

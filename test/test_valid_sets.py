@@ -63,6 +63,42 @@ def test_what_an_effect_makes_uncertain_counts_as_far_as_it_explains_more(payloa
         assert bool(sets.sufficient(names)) is enough
 
 
+@pytest.mark.parametrize('share', [0.3, 1.0, 1e4])
+def test_equations_may_be_off_by_their_share_of_what_they_explain_together(
+        payload, monkeypatch, share):
+    """
+    Or by less; but not by what each changes alone: changes that cancel would explain anything.
+
+    Nearly all of that share is beyond doubt, next to what is explained.
+    """
+    sets, names = payload.sets, frozenset(['payload_error'])
+    explained = 9.0 * sets.rmse_95 ** 2
+    most = sets.settings.form ** 2 * explained
+    monkeypatch.setattr(sets, '_largest_errors', {names: (
+        sets.fits[names].covariance, sets.rmse_95, np.sqrt(sets.rmse_95 ** 2 + share * most))})
+    errors = {frozenset(): np.sqrt(1.0 + explained), names: 1.0}
+    monkeypatch.setattr(sets, 'own_error', lambda one: errors[one])
+    counts = min(share, 1.0) * most
+    limit = np.sqrt(sets.rmse_95 ** 2 + counts * (1.0 - counts / explained))
+    for factor, enough in ((0.9999, True), (1.0001, False)):
+        monkeypatch.setattr(sets, 'noise_free_rmse', lambda one, left=factor * limit: left)
+        assert bool(sets.sufficient(names)) is enough
+
+
+@pytest.mark.parametrize('share, enough', [(0.45, False), (0.55, True)])
+def test_a_set_that_fails_in_rows_held_out_does_not_suffice(payload, monkeypatch, share, enough):
+    """However little it leaves in those fitted: half of what it explains there is asked for."""
+    sets, names = payload.sets, frozenset(['payload_error'])
+    measured, fit = payload.problem.measured, sets.fits[names]
+    before, fitted = (np.mean((measured - one.predicted) ** 2) for one in (sets.base, fit))
+    held_out = measured - np.sqrt(before - share * (before - fitted))
+    monkeypatch.setattr(sets, '_predicts', {})
+    monkeypatch.setattr(sets.fitter, 'cross_validate', lambda fits: [
+        dataclasses.replace(one, held_out=held_out) for one in fits])
+    assert sets.noise_free_rmse(names) < sets._allowed(names)
+    assert bool(sets.sufficient(names)) is enough
+
+
 def test_a_set_without_effects_suffices_as_far_as_the_model_may_be_off(payload, monkeypatch):
     for share, enough in ((0.99, True), (1.01, False)):
         monkeypatch.setattr(payload.sets, 'noise_free_rmse',
@@ -113,8 +149,9 @@ def test_a_larger_set_may_be_the_answer_where_only_it_leaves_no_more_than_the_mo
     small = frozenset(['payload_error'])
     larger = next(names for names in payload.sets.fits if small < names)
     least = payload.sets.log_posterior(small)
+    largest = 1.5 * payload.sets.rmse_95
     monkeypatch.setitem(payload.sets._largest_errors, small,
-                        (payload.sets.fits[small].covariance, 1.5 * payload.sets.rmse_95))
+                        (payload.sets.fits[small].covariance, largest, largest))
     for odds, small_error, would_do in ((0.1, 1.2, False), (0.1, 0.9, True), (-0.1, 1.2, True)):
         errors = {small: small_error * payload.sets.rmse_95, larger: 0.8 * payload.sets.rmse_95}
         monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: errors.get(names, 1.0))

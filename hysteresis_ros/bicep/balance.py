@@ -76,6 +76,7 @@ class ArmBalance:
         self.coulomb, self.viscous, self.inertia = (
             float(sum(values)) for values in zip((0.0, 0.0, 0.0), *resistances))
         self.capstan = float(sum(effect.capstan() for effect in chain.mechanism))
+        stiction = float(max((effect.stiction() for effect in chain.mechanism), default=0.0))
         sticks = self.coulomb > 0.0 or self.capstan > 0.0
         leverage = (muscles or geometry.muscle_count) * np.maximum(statics.moment_arm, 1e-6)
         # What the arm gets of a tension while it sinks; its inverse while it rises.
@@ -101,7 +102,7 @@ class ArmBalance:
             grid=np.column_stack([statics.theta, statics.length, statics.moment, leverage,
                                   *(column for line in lines for column in line)]),
             loads=loads, spacing=spacing, base=self.base, coulomb=self.coulomb,
-            capstan=self.capstan, viscous=self.viscous, inertia=self.inertia,
+            stiction=stiction, capstan=self.capstan, viscous=self.viscous, inertia=self.inertia,
             tolerance=1e-10 * self.span,
             longest=LONGEST_PHASE * math.sqrt(self.inertia / stiffness),
             heaviest=max(float(np.max(np.abs(statics.moment))), 1e-12),

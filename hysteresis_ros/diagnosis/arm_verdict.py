@@ -37,7 +37,6 @@ LEAST_CHANGE = 0.3
 MOST_UNOBSERVABLE = 0.8
 # An implausible set whose residual is less than this share of the best one's resembles it.
 RESEMBLES = 0.6
-MOST_ALTERNATIVES = 3
 
 
 def arm_verdict(problem: ArmProblem, settings: Settings, rng: np.random.Generator,
@@ -183,8 +182,7 @@ class _Verdict:
                 continue
             places, new = sorted(chosen - names), sorted(names - chosen)
             for place, other in zip(places, new):
-                if all(other not in named for named in found.values()) and len(
-                        found[place]) < MOST_ALTERNATIVES:
+                if all(other not in named for named in found.values()):
                     found[place].append(other)
         return found
 

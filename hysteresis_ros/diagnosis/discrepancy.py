@@ -3,7 +3,7 @@
 """
 Discrepancy of the base model: how wrong it is by itself, as a covariance of an arm's angles.
 
-It is known before the arm moves.
+It is known before the arm moves. With effects, their equations may be off as well.
 
 * The bench says how large the error of the length is under each load, on trials or loads that were
   held out, and by how much larger it is halfway through the transformation than at its ends. On
@@ -58,7 +58,7 @@ FEWEST_LOADS = 3
 @dataclasses.dataclass
 class Discrepancy:
     """
-    The base model's own error, as the parts of its covariance.
+    The base model's own error and that of effects' equations, as the parts of its covariance.
 
     Errors of one part are correlated between rows as these are near each other, by
 
@@ -78,21 +78,24 @@ class Discrepancy:
     kept : ndarray, shape (n,)
         What the response would change by if martensite kept all of its strain. A share of it, from
         none to all, is an error of all rows together.
+    equations : ndarray, shape (n, e)
+        The same as `parts`, for the equations of effects.
     """
 
     parts: np.ndarray
     places: np.ndarray
     common: np.ndarray
     kept: np.ndarray
+    equations: np.ndarray
 
     @property
     def size(self) -> float:
-        """Root mean square, in the unit of the response."""
+        """Root mean square of the base model's own error, in the unit of the response."""
         return float(np.hypot(self.size_besides_kept, KEPT * np.sqrt(np.mean(self.kept ** 2))))
 
     @property
     def size_besides_kept(self) -> float:
-        """Root mean square without what martensite keeps, in the unit of the response."""
+        """The same without what martensite keeps."""
         return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1)
                                      + np.sum(self.common ** 2, axis=1))))
 
@@ -105,12 +108,17 @@ class Discrepancy:
         """Return a residual (n,) without the share of `kept` that explains most of it."""
         return residual - self.kept_share(residual) * self.kept
 
+    def of_model_alone(self) -> Discrepancy:
+        """Return the base model's own error, as if all equations of effects were exact."""
+        return dataclasses.replace(self, equations=self.equations[:, :0])
+
     def matrix(self, kept: bool = True) -> np.ndarray:
         """Return the covariance, shape (n, n); without what martensite keeps if not `kept`."""
         squares = np.sum(self.places ** 2, axis=1)
         gaps = squares[:, None] + squares[None, :] - 2.0 * self.places @ self.places.T
+        parts = np.hstack([self.parts, self.equations])
         known = (self.common @ self.common.T
-                 + (self.parts @ self.parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0)))
+                 + (parts @ parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0)))
         return known + KEPT ** 2 * np.outer(self.kept, self.kept) if kept else known
 
 
@@ -264,7 +272,8 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     return Discrepancy(
         parts, np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])
         / settings.correlation, common,
-        np.zeros(len(predicted)) if known else formation_change(problem, effects))
+        np.zeros(len(predicted)) if known else formation_change(problem, effects),
+        np.zeros((len(predicted), 0)))
 
 
 def formation_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

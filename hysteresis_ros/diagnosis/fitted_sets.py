@@ -25,6 +25,9 @@ SIGNIFICANCE = 0.05
 # The same for noise that is not as large at all times: so many noisy recordings are called unknown
 # by chance.
 NOISE_SIGNIFICANCE = 0.01
+# Of what a set explains in the rows fitted it has to explain this share in rows held out: with less
+# it fails in more of that than it predicts.
+PREDICTED = 0.5
 # What of a `Fit` its judgement says.
 JUDGED = ('log_evidence', 'values', 'spread', 'judged')
 
@@ -67,10 +70,12 @@ class FittedSets:
         # Each with the response that it belongs to.
         self._errors: dict[frozenset[str], tuple[np.ndarray, float, float]] = {}
         self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
+        self._predicts: dict[frozenset[str], tuple[np.ndarray, bool]] = {}
         # The same draws for all, or chance would decide between two sets.
         self._seed = int(rng.integers(2 ** 32))
         self.rmse_95 = self._largest_error(self.covariance)
-        self._largest_errors: dict[frozenset[str], tuple[Covariance, float]] = {}
+        # Each with the covariance that it belongs to.
+        self._largest_errors: dict[frozenset[str], tuple[Covariance, float, float]] = {}
 
     @property
     def base(self) -> Fit:
@@ -191,9 +196,26 @@ class FittedSets:
         Along the way that the arm takes with these effects: friction, say, keeps the load from a
         muscle that cools down, which no load at rest shows. What the effects make the model more
         uncertain by counts as far as they explain more than that: with an effect that explains as
-        little as it makes uncertain, anything would suffice.
+        little as it makes uncertain, anything would suffice. And their equations may be off by a
+        share of what they explain together: with changes that cancel, anything would, too.
         """
-        return self.noise_free_rmse(names) <= self._allowed(names)
+        return (self.noise_free_rmse(names) <= self._allowed(names)
+                and (not names or self.predicts(names)))
+
+    def predicts(self, names: frozenset[str]) -> bool:
+        """
+        Whether a set explains in rows held out at least half of what it explains in those fitted.
+
+        Effects that are found in some rows and say nothing of the others stand for something else.
+        """
+        fit = self.fits[names]
+        known = self._predicts.get(names)
+        if known is None or known[0] is not fit.predicted:
+            before, after, fitted = (_rms(self.problem.measured - response) ** 2 for response in (
+                self.base.predicted, self.fitter.cross_validate([fit])[0].held_out, fit.predicted))
+            self._predicts[names] = known = (
+                fit.predicted, before - after > PREDICTED * (before - fitted))
+        return known[1]
 
     def _allowed(self, names: frozenset[str]) -> float:
         """Return the largest RMSE that a set may have, in the unit of the response."""
@@ -202,9 +224,13 @@ class FittedSets:
             return self.rmse_95
         known = self._largest_errors.get(names)
         if known is None or known[0] is not covariance:
-            self._largest_errors[names] = known = (covariance, self._largest_error(covariance))
+            along = covariance.of(covariance.discrepancy.of_model_alone())
+            self._largest_errors[names] = known = (
+                covariance, self._largest_error(along), self._largest_error(covariance))
+        _, own, with_equations = known
         explained = self.own_error(frozenset()) ** 2 - self.own_error(names) ** 2
-        further = known[1] ** 2 - self.rmse_95 ** 2
+        further = own ** 2 - self.rmse_95 ** 2 + min(
+            with_equations ** 2 - own ** 2, self.settings.form ** 2 * max(explained, 0.0))
         if further > 0.0:
             # The share beyond doubt, as James and Stein shrink an estimate by it. From half of what
             # is explained on, that share falls faster than the uncertainty grows; but a model that

@@ -103,10 +103,9 @@ def _ways(problem: ArmProblem, effects: Sequence[Effect]
                 still = np.stack([
                     _held(stage, model.sign * (x - load), np.full(len(x), arm.width_at(load)))
                     for load in loads])[:, 1:]
-                # What has lengthened the muscle besides does so either way. Where friction holds
-                # the arm, its load is another one than at rest, which is a part of the difference.
-                besides = 0.0 if arm.sticks else (
-                    arm.demand_at(angle[trial.rows]) - arm.demand_at(arm.angle(loads, moving)))
+                # What has lengthened the muscle besides, or holds the arm, does so either way.
+                besides = (arm.demand_at(angle[trial.rows])
+                           - arm.demand_at(arm.angle(loads, moving)))
                 path = (arm.angle(loads, (still + besides)[:, judged])
                         - arm.angle(loads, (moving + besides)[judged]))
             yield tension[1:][judged], moving[judged] / span, path
@@ -121,8 +120,6 @@ class _Statics:
         statics = Statics.of(geometry, self.theta)
         for effect in chain.mechanism:
             statics = effect.forward(statics, geometry)
-        self.sticks = any(
-            effect.resistance()[0] > 0.0 or effect.capstan() > 0.0 for effect in chain.mechanism)
         self.tension = force = np.maximum(statics.moment, 0.0) / (
             geometry.muscle_count * np.maximum(statics.moment_arm, 1e-6))
         # What H2 feels, and by how much its loop is wider.

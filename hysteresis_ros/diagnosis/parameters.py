@@ -11,6 +11,10 @@ import numpy as np
 from hysteresis_ros.effects import Effect, Parameter
 
 
+# What is left of a form's parameter where it would vanish, as a share of its range.
+SMALLEST_FORM = 1e-6
+
+
 class ParameterVector:
     """
     The parameters of some effects that are fitted to one kind of measurement.
@@ -67,7 +71,11 @@ class ParameterVector:
         values: list[dict[str, float]] = [{} for _ in self.effects]
         for (index, parameter), value in zip(self.entries, np.clip(
                 vector, self.lower, self.upper)):
-            values[index][parameter.name] = _from_unit(parameter, float(value))
+            own = _from_unit(parameter, float(value))
+            if parameter.form and own == parameter.neutral:
+                # A form that was chosen does not become the simplest one on its way.
+                own += SMALLEST_FORM * _unit(parameter)
+            values[index][parameter.name] = own
         return [effect.with_values(**changed)
                 for effect, changed in zip(self.effects, values)]
 

@@ -100,8 +100,8 @@ class Selection:
         found = self._along(effects, fit.predicted)
         without = self.fitter.simulate([
             [one for one in fit.effects if one is not effect] for effect in fit.effects])
-        return dataclasses.replace(found, parts=np.column_stack([
-            found.parts, *(0.5 * self.settings.form * (fit.predicted - without))]))
+        return dataclasses.replace(
+            found, equations=0.5 * self.settings.form * (fit.predicted - without).T)
 
     def _along(self, effects: Sequence[Effect], predicted: np.ndarray) -> Discrepancy:
         """Return the base model's own error where the arm goes with all effects of a model."""
@@ -164,8 +164,9 @@ class Selection:
         Return the sets of a size that are worth one more effect.
 
         The most probable ones, if the best set's residual is too large, or what cannot be the
-        answer is more probable, and stands for it. If not, but a further effect explains some of
-        the residual: all of these single effects, and of larger sets the best alone.
+        answer is more probable, and stands for it. If not, but more is left than the base model is
+        off by: all of these single effects, and of larger sets the best alone, where one more
+        effect makes it more probable.
         """
         valid = self.sets.valid()
         best = next(filter(self.sets.sufficient, valid), valid[0] if valid else None)
@@ -173,12 +174,12 @@ class Selection:
                 best and best != self.sets.ranked()[0]):
             return self.sets.best_of(size)
         # What a further effect explains has to exceed the base model's own error.
-        if (not best or self.sets.own_error(best) <= self.covariance.size
-                or not self._promising(best)):
+        if not best or self.sets.own_error(best) <= self.covariance.size:
             return []
         if size == 1:
+            # Two effects that change much may take the place of one, which no linearisation shows.
             return self.sets.best_of(size)
-        return [best] if len(best) == size else []
+        return [best] if len(best) == size and self._promising(best) else []
 
     def _promising(self, names: frozenset[str]) -> bool:
         """Whether one more effect makes a set more probable, by linearisation."""

@@ -22,18 +22,26 @@ class CoulombFriction(MechanismEffect):
 
     id = 'coulomb_friction'
     sentence = 'Dry friction holds the arm until the muscle has overcome it.'
-    equation = 'tau += tau_c sign(dtheta/dt), sticking inside'
-    source = 'Coulomb friction'
+    equation = ('tau += tau_c sign(dtheta/dt); at rest the arm sticks as long as '
+                '|tau| <= (1 + rest) tau_c')
+    source = ('Coulomb friction, larger at rest as of Stribeck (Armstrong-Helouvry and others, '
+              'Automatica 30 (1994) 1083)')
     shows_in = 'reversals'
     experiment = 'tap the arm; move it by hand with cold muscles'
     confused_with = ('backlash',)
     parameters = (
         Parameter('tau_c', 'N m', 'moment of friction', 0.001, 0.15, 0.0, (0.01, 0.05),
-                  log=True, scale='moment'),)
+                  log=True, scale='moment'),
+        Parameter('rest', '1', 'share by which it is larger until the arm slides', 0.0, 1.0, 0.0,
+                  (0.0, 0.5), limits=(0.0, 1.0), form=True))
 
     def resistance(self) -> tuple[float, float, float]:
         """Return the friction's moment."""
         return self.tau_c, 0.0, 0.0
+
+    def stiction(self) -> float:
+        """Return by what share it is larger at rest."""
+        return self.rest
 
 
 class ViscousFriction(MechanismEffect):

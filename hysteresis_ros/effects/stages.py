@@ -200,6 +200,10 @@ class MechanismEffect(Effect):
         """
         return 0.0, 0.0, 0.0
 
+    def stiction(self) -> float:
+        """Return the share by which the Coulomb moment of an arm at rest exceeds that in motion."""
+        return 0.0
+
     def capstan(self) -> float:
         """Return mu phi, by whose exponential the muscles' cables change a tension in motion."""
         return 0.0

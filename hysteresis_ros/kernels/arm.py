@@ -53,13 +53,14 @@ class Arm(NamedTuple):
 
     `grid` (n, 9 or 19) and `loads` (m, 4) have the columns above; `spacing` [N] is that of the
     loads. `base` [m] is the least output of H2; `coulomb` [N m], `viscous` [N m s/rad] and
-    `inertia` [kg m^2] resist motion, and so do cables that change a tension by exp(-+ `capstan`);
-    `tolerance` [N] is the load that may be missing at rest. `longest` [s] is the longest dt of an
-    arm that rings, `heaviest` [N m] the largest moment at rest, and `calm` a step of x that does
-    not make it ring. `sticks` says whether any of the friction is dry, `rigid` whether the demand
-    does not depend on that, `strained` whether an offset counts by the load, `dynamic` whether
-    velocity or acceleration count, `swings` whether each dt solves the equation of motion, and
-    `plays` whether the loop's width depends on the load (see `load_play`).
+    `inertia` [kg m^2] resist motion, and so do cables that change a tension by exp(-+
+    `capstan`); dry friction is larger at rest by the share `stiction`. `tolerance` [N] is the
+    load that may be missing at rest. `longest` [s] is the longest dt of an arm that rings,
+    `heaviest` [N m] the largest moment at rest, and `calm` a step of x that does not make it
+    ring. `sticks` says whether any of the friction is dry, `rigid` whether the demand does not
+    depend on that, `strained` whether an offset counts by the load, `dynamic` whether velocity
+    or acceleration count, `swings` whether each dt solves the equation of motion, and `plays`
+    whether the loop's width depends on the load (see `load_play`).
     """
 
     wires: Wires
@@ -68,6 +69,7 @@ class Arm(NamedTuple):
     spacing: float
     base: float
     coulomb: float
+    stiction: float
     capstan: float
     viscous: float
     inertia: float

@@ -13,7 +13,7 @@ import numpy as np
 from . import bundle, grid, root
 from .arm import (
     ANGLE, Arm, BUNDLE_SEARCH, DEMAND, demand_at, factor_at, LINE, LOAD, LOOSER, place, present,
-    required, REST_GAIN, REST_SEARCH, State, width)
+    required, REST_GAIN, REST_SEARCH, State, VELOCITY, width)
 from .formation import keep, LOAD as BEYOND, parts
 from .lean import inlined, lean
 from .operator import last_input, last_output, peek, solve, step
@@ -130,18 +130,20 @@ def direction(arm: Arm, state: State, x: float, offset: float, factor: float, dt
     """Return in which direction the arm slides: 1 down, -1 up, 0 where friction holds it."""
     motion = state.motion
     k, share = present(arm, motion)
+    # Of what friction can take in motion, so much at rest.
+    most = 1.0 + arm.stiction if motion[VELOCITY] == 0.0 else 1.0
     if arm.rigid:
         tension = max(last_input(arm.wires.table, state.memories[0]) + x, 0.0)
-        if required(arm, motion, 1, k, share, dt) - width(arm, 1, k, share) > tension:
+        if _required_held(arm, state, 1, k, share, most, dt) - width(arm, 1, k, share) > tension:
             return 1
-        return -1 if required(arm, motion, 2, k, share, dt) < tension else 0
-    sinking = _lacking_held(arm, state, k, share, 1.0, x, offset, factor, dt)
+        return -1 if _required_held(arm, state, 2, k, share, most, dt) < tension else 0
+    sinking = _lacking_held(arm, state, k, share, most, x, offset, factor, dt)
     if sinking > 0.0:
         return 1
-    rising = _lacking_held(arm, state, k, share, -1.0, x, offset, factor, dt)
+    rising = _lacking_held(arm, state, k, share, -most, x, offset, factor, dt)
     if rising < 0.0:
         return -1
-    drag = root.between(motion, REST_SEARCH, 1.0, sinking, -1.0, rising, arm.tolerance)
+    drag = root.between(motion, REST_SEARCH, most, sinking, -most, rising, arm.tolerance)
     while root.searching(motion, REST_SEARCH):
         drag = root.proceed(motion, REST_SEARCH, _lacking_held(
             arm, state, k, share, drag, x, offset, factor, dt))
@@ -153,7 +155,7 @@ def direction(arm: Arm, state: State, x: float, offset: float, factor: float, dt
 @inlined
 def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: float,
                   offset: float, factor: float, dt: float) -> float:
-    """Return the load that is missing where friction takes a part, -1 to 1, of what it can."""
+    """Return the load that is missing where friction takes a part of that in motion."""
     edge, part = 1 if drag > 0.0 else 2, abs(drag)
     demand = demand_at(arm, 0, k, share, offset)
     demand += part * (demand_at(arm, edge, k, share, offset) - demand)
@@ -170,6 +172,8 @@ def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: 
 @inlined
 def _required_held(arm: Arm, state: State, edge: int, k: int, share: float, part: float,
                    dt: float) -> float:
-    """Return the load that the arm asks for where friction takes a part of what it can."""
+    """Return the load that the arm asks for where friction takes a part of that in motion."""
     load = required(arm, state.motion, 0, k, share, dt)
-    return load + part * (required(arm, state.motion, edge, k, share, dt) - load)
+    load += part * (required(arm, state.motion, edge, k, share, dt) - load)
+    # A wire cannot push.
+    return load if part <= 1.0 else max(load, 0.0)
