@@ -132,6 +132,20 @@ def test_settled_states_of_a_continuous_run(bench, tmp_path, capsys):
     assert 'no settled states' in line
 
 
+def test_trials_that_are_not_looked_at_need_no_settled_states(bench, tmp_path, capsys):
+    time = np.arange(0, 300, 0.5)
+    held = np.random.default_rng(2).uniform(0.0, 5.0, 10)[(time / 30).astype(int)]
+    columns = {'time': np.tile(time, 2), 'trial': np.repeat([0.0, 3.0], len(time)),
+               'voltage': np.concatenate([time / 60, held])}
+    write_csv({**columns, 'force': 1 + columns['voltage']}, tmp_path / 'run.csv')
+    given = ['diagnose', '--model', f'{bench}/model.yaml', '--data', f'{tmp_path}/run.csv',
+             '--settled']
+    assert 'from 0.0 s of trial 0 on' in failed(given, capsys)
+    # Of that trial it is no more than the force that cannot be diagnosed.
+    assert 'has no load to explain' in failed([*given, '--trials', '3'], capsys)
+    assert read_measurement(tmp_path / 'run.csv', settled=True, trials=[3]).rows == 10
+
+
 def test_predict_adds_a_column(bench, tmp_path, capsys):
     out = tmp_path / 'p.csv'
     for method in ('preisach', 'linear'):

@@ -5,6 +5,7 @@
 import dataclasses
 
 from model_support import bicep_model, effect_of, preisach, runs
+import numpy as np
 import pytest
 from selection_support import recording, selection
 
@@ -96,3 +97,13 @@ def test_a_range_stays_as_it_is_where_nothing_is_known_to_scale_it_by():
     bench = Surroundings(0.27, 3.0, 36.0, 0.02)
     assert catalogue()['payload_error'].describe(bench) == catalogue()[
         'payload_error'].describe(None)
+
+
+def test_a_drift_starts_at_rates_that_suit_the_recording():
+    """In an hour and a half a room cannot change by 1 V^2 every ten minutes."""
+    drift = catalogue()['ambient_drift'](PAPER)
+    for hours in (0.3, 1.5):
+        clock = np.linspace(0.0, 3600.0 * hours, 50)
+        for values in drift.moments(np.zeros(50), clock):
+            total = drift.with_values(**values).total(clock)
+            assert np.ptp(total) == pytest.approx(4.0)

@@ -167,7 +167,8 @@ def divided(measurements: Sequence[Measurement], trials: Sequence[int] | None
 
 
 def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
-             settled: bool = False, columns: Collection[Mapped] = ()) -> list[Measurement]:
+             settled: bool = False, columns: Collection[Mapped] = (),
+             trials: Sequence[int] | None = None) -> list[Measurement]:
     """
     Read measurements.
 
@@ -179,6 +180,8 @@ def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
         Reduce continuous runs to the ends of their holds.
     columns : collection of Mapped
         What the columns of tables mean.
+    trials : sequence of int, optional
+        Those to look at.
 
     Returns
     -------
@@ -187,10 +190,10 @@ def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
     Raises
     ------
     MeasurementError
-        If one cannot be read, or has no settled states.
+        If one cannot be read, lacks a trial, or has no settled states.
 
     """
-    return [read_measurement(path, namespace, settled, columns)
+    return [read_measurement(path, namespace, settled, columns, trials)
             for path in progress(paths, 'reading')]
 
 

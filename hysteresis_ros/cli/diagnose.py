@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, add_trials, divided, origin, processes,
-    read_all, say, seed, Subparsers, warn, warn_of_loads, write_json)
+    add_data, add_json, add_model, add_report, add_settled, add_trials, origin, processes, read_all,
+    say, seed, Subparsers, warn, warn_of_loads, write_json)
 from hysteresis_ros.cli.rounds import BENCH, Rounds
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ def run(args: argparse.Namespace) -> None:
     from hysteresis_ros.api import diagnose, load_model
 
     model = load_model(args.model)
-    measurements, _ = divided(
-        read_all(args.data, args.namespace, args.settled, args.columns), args.trials)
+    measurements = read_all(
+        args.data, args.namespace, args.settled, args.columns, args.trials)
     rounds = Rounds(BENCH)
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed, progress=rounds)
     rounds.close()

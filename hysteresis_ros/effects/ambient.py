@@ -88,6 +88,11 @@ class AmbientDrift(ThermalEffect):
         t = clock / self.CLOCK_UNIT
         return self.offset + self.rate * t + self.curvature * t * t
 
+    def moments(self, residual: np.ndarray, clock: np.ndarray) -> list[dict[str, float]]:
+        """Return rates at which a room of half the usual range changes in the recording."""
+        half = 0.5 * self.parameters[0].high * self.CLOCK_UNIT / max(float(np.ptp(clock)), 1.0)
+        return [{'rate': -half}, {'rate': half}]
+
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
         """Name also the total, where no room is as warm or changes as much in a recording."""
         total = self.total(np.linspace(0.0, duration, 101))

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measurements: one table type, read from CSV files or rosbag2 recordings."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 import os
 from pathlib import Path
 
@@ -21,8 +21,8 @@ __all__ = [
 
 
 def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
-                     settled: bool = False,
-                     columns: str | Collection[Mapped] = ()) -> Measurement:
+                     settled: bool = False, columns: str | Collection[Mapped] = (),
+                     trials: Sequence[float] | None = None) -> Measurement:
     """
     Read a CSV file or a rosbag2 recording.
 
@@ -38,6 +38,8 @@ def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
     columns : str or collection of Mapped
         What the columns of a table mean, such as ``angle=theta_deg:deg,time=t_s``; a recording
         has topics and needs none.
+    trials : sequence of float, optional
+        Those to take; the others may be as they are.
 
     Returns
     -------
@@ -46,8 +48,8 @@ def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
     Raises
     ------
     MeasurementError
-        If the file is missing, is no measurement or has no settled states; the message says what
-        to do.
+        If the file is missing, is no measurement, lacks a trial or has no settled states; the
+        message says what to do.
 
     """
     path = Path(path)
@@ -55,6 +57,8 @@ def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
         raise MeasurementError(f'{path}: no such file or folder')
     mapping = parse_columns(columns) if isinstance(columns, str) else columns
     found = read_bag(path, namespace) if is_bag(path) else read_csv(path, mapping)
+    if trials is not None:
+        found = found.select(trials)
     reduced = settled_rows(found) if settled else found
     if reduced is None:
         trial, time = not_held_since(found)
