@@ -195,8 +195,6 @@ def test_something_that_happened_once_is_told_by_its_time(model):
     assert 0.3 * 7200.0 - 60.0 <= found.event <= 0.6 * 7200.0 + 60.0
 
 
-@pytest.mark.xfail(strict=True, reason='the residual of one effect is 0.4 degrees, less than the '
-                   '0.8 that the base model may err by: no pair is looked for')
 def test_two_effects_that_one_could_explain_are_found_as_a_pair(model):
     """A dead zone and a sag look like a load that counts more."""
     train, _ = recordings({'supply_sag': 1.0, 'pwm_dead_zone': 1.0}, trials=(0, 1, 2, 3))
