@@ -9,7 +9,7 @@ from model_support import bicep_model, effect_of, runs, STRENGTHS
 import numpy as np
 import pytest
 
-from hysteresis_ros.diagnosis.arm_fit import Fit, Fitter
+from hysteresis_ros.diagnosis.arm_fit import _Walk, Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance
 from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -425,3 +425,21 @@ def test_usual_values_keep_what_is_chosen_and_not_fitted():
     assert payload.values['dm'] in {start.values['dm'] for start in starts_of(payload, 'arm')}
     assert payload.values['dm'] != 44.0
     assert creep.values['kept'] == 1.0 and creep.values['t0'] == 3.0
+
+
+def test_a_form_that_ends_as_the_simplest_is_free_no_longer(monkeypatch):
+    """Friction that is no larger at rest: what is left of it is one parameter."""
+    model = bicep_model()
+    friction, other = (effect_of(model, 'coulomb_friction', tau_c=0.02, rest=rest)
+                       for rest in (0.0, 0.5))
+    parameters = ParameterVector([other], 'arm')
+    assert list(parameters.free_still([other])) == [True, True]
+    assert list(parameters.free_still([friction])) == [True, False]
+
+    def end_at_the_bound(walk, vector, predicted, cost):
+        walk.vector, walk.active = np.array([vector[0], 0.0]), False
+    monkeypatch.setattr(_Walk, 'step_to', end_at_the_bound)
+    fitter = fitter_of(model, noisy(model, [effect_of(model, 'coulomb_friction', tau_c=0.04)]))
+    fit, = fitter.fit([[other]], fitter.covariance.points[0])
+    assert fit.effects[0].rest == 0.0
+    assert fit.vector.shape == (1,) and fit.jacobian.shape[1] == 1

@@ -272,8 +272,10 @@ class Fitter:
             self._differentiate(walk)
         if not np.all(np.isfinite(walk.jacobian)):
             return []
-        return [self.judge(Fit(walk.parameters.with_vector(walk.vector), walk.vector,
-                               walk.predicted, walk.jacobian, duration=self.problem.duration))]
+        found = walk.parameters.with_vector(walk.vector)
+        free = walk.parameters.free_still(found)
+        return [self.judge(Fit(found, walk.vector[free], walk.predicted, walk.jacobian[:, free],
+                               duration=self.problem.duration))]
 
     def shared(self, fit: Callable[[Sequence[Effect]], list[Fit]],
                sets: Sequence[Sequence[Effect]]) -> list[list[Fit]]:

@@ -78,8 +78,7 @@ class Response:
         A form that comes out neutral is the simplest one and stays so: it is no longer free.
         """
         effects = self.parameters.with_vector(vector)
-        free = ParameterVector(effects, self.problem.kind).entries
-        kept = [entry in free for entry in self.parameters.entries]
+        kept = self.parameters.free_still(effects)
         solution = self._solution(vector)
         return Fit(effects, vector[kept], solution.predicted, duration=self.problem.duration,
                    passive=solution.weights.passive)

@@ -11,10 +11,6 @@ import numpy as np
 from hysteresis_ros.effects import Effect, Parameter
 
 
-# What is left of a form's parameter where it would vanish, as a share of its range.
-SMALLEST_FORM = 1e-6
-
-
 class ParameterVector:
     """
     The parameters of some effects that are fitted to one kind of measurement.
@@ -32,7 +28,7 @@ class ParameterVector:
     """
 
     def __init__(self, effects: Sequence[Effect], kind: str) -> None:
-        self.effects = list(effects)
+        self.effects, self._kind = list(effects), kind
         self.entries = [(index, parameter) for index, effect in enumerate(self.effects)
                         for parameter in effect.parameters
                         if kind in parameter.kinds and not parameter.choices
@@ -71,13 +67,18 @@ class ParameterVector:
         values: list[dict[str, float]] = [{} for _ in self.effects]
         for (index, parameter), value in zip(self.entries, np.clip(
                 vector, self.lower, self.upper)):
-            own = _from_unit(parameter, float(value))
-            if parameter.form and own == parameter.neutral:
-                # A form that was chosen does not become the simplest one on its way.
-                own += SMALLEST_FORM * _unit(parameter)
-            values[index][parameter.name] = own
+            values[index][parameter.name] = _from_unit(parameter, float(value))
         return [effect.with_values(**changed)
                 for effect, changed in zip(self.effects, values)]
+
+    def free_still(self, effects: Sequence[Effect]) -> np.ndarray:
+        """
+        Return which parameters are free with other values of the effects, bool of shape (k,).
+
+        A form that comes out neutral is the simplest one and stays so.
+        """
+        free = ParameterVector(effects, self._kind).entries
+        return np.array([entry in free for entry in self.entries], dtype=bool)
 
     def with_intervals(self, vector: np.ndarray, half_widths: np.ndarray) -> list[Effect]:
         """Return the effects at `vector` (k,) with the intervals of `half_widths` (k,)."""
