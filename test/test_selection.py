@@ -3,6 +3,7 @@
 """Which sets of effects are tried: on recordings of an arm that the model itself has made."""
 
 import dataclasses
+import math
 
 from model_support import bicep_model, effect_of
 import numpy as np
@@ -129,11 +130,11 @@ def test_all_starts_are_tried_where_nothing_suffices(model, monkeypatch, change,
 
 
 def test_what_suffices_alone_grows_alone(payload, monkeypatch):
-    """Of sets of several effects; of single effects all the most probable ones do."""
+    """Where one more effect is promising."""
     small, pair = frozenset(['payload_error']), frozenset(['payload_error', 'frame_tilt'])
     monkeypatch.setattr(payload, '_promising', lambda names: True)
     monkeypatch.setattr(payload.covariance, 'size', 0.0)
-    assert payload._worth_growing(1) == payload.sets.best_of(1)
+    assert payload._worth_growing(1) == [small]
     assert payload._worth_growing(2) == []
     for ranks in ('valid', 'ranked'):
         monkeypatch.setattr(payload.sets, ranks, lambda: [pair, small])
@@ -143,6 +144,18 @@ def test_what_suffices_alone_grows_alone(payload, monkeypatch):
     assert payload._worth_growing(2) == []
     monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: 2.0 * payload.sets.rmse_95)
     assert payload._worth_growing(2) == payload.sets.best_of(2)
+
+
+@pytest.mark.parametrize('left, grown', [(1.01, True), (0.99, False)])
+def test_all_single_effects_grow_where_one_more_has_room(payload, monkeypatch, left, grown):
+    """Besides what the base model is off by in half of all cases, whatever seems promising."""
+    monkeypatch.setattr(payload, '_promising', lambda names: False)
+    room = left * math.hypot(payload.covariance.size, payload.sets.rmse_50)
+    assert room < payload.sets.rmse_95
+    monkeypatch.setattr(payload.sets, 'own_error', lambda names: room)
+    monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: room)
+    monkeypatch.setattr(payload.sets, 'valid', lambda: [frozenset(['payload_error'])])
+    assert payload._worth_growing(1) == (payload.sets.best_of(1) if grown else [])
 
 
 def test_sets_grow_on_where_what_cannot_be_the_answer_is_more_probable(payload, monkeypatch):

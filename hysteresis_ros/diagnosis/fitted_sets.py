@@ -52,6 +52,8 @@ class FittedSets:
     rmse_95 : float
         Root mean square that the base model's own error stays below at 95 %, but for what
         martensite keeps, in the unit of the response.
+    rmse_50 : float
+        Its median.
     odds : float
         Logarithm of the odds that an effect acts, before any data.
     temper : float
@@ -74,6 +76,7 @@ class FittedSets:
         # The same draws for all, or chance would decide between two sets.
         self._seed = int(rng.integers(2 ** 32))
         self.rmse_95 = self._largest_error(self.covariance)
+        self.rmse_50 = self._largest_error(self.covariance, 0.5)
         # Each with the covariance that it belongs to.
         self._largest_errors: dict[frozenset[str], tuple[Covariance, float, float]] = {}
 
@@ -240,10 +243,10 @@ class FittedSets:
             further *= 1.0 - further / explained
         return math.sqrt(self.rmse_95 ** 2 + further)
 
-    def _largest_error(self, covariance: Covariance) -> float:
-        """Return the root mean square that a discrepancy stays below at 95 %; see `own_error`."""
+    def _largest_error(self, covariance: Covariance, level: float = 0.95) -> float:
+        """Return the RMS that a discrepancy stays below at a probability; see `own_error`."""
         return covariance.largest_error(
-            np.random.default_rng(self._seed), self.settings.draws, kept=False)
+            np.random.default_rng(self._seed), self.settings.draws, level, kept=False)
 
     def valid(self) -> list[frozenset[str]]:
         """

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 import dataclasses
 import itertools
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -174,10 +175,12 @@ class Selection:
                 best and best != self.sets.ranked()[0]):
             return self.sets.best_of(size)
         # What a further effect explains has to exceed the base model's own error.
-        if not best or self.sets.own_error(best) <= self.covariance.size:
+        own_error, expected = self.sets.own_error(best), self.covariance.size
+        if not best or own_error <= expected:
             return []
-        if size == 1:
-            # Two effects that change much may take the place of one, which no linearisation shows.
+        if size == 1 and own_error > math.hypot(expected, self.sets.rmse_50):
+            # That leaves as much as the base model is off by in half of all cases. Two effects that
+            # change much may take the place of one, which no linearisation shows.
             return self.sets.best_of(size)
         return [best] if len(best) == size and self._promising(best) else []
 
