@@ -77,16 +77,19 @@ def load_model(path: AnyPath) -> MuscleModel:
 
 @overload
 def read(path: AnyPath, /, *, namespace: str | None = None,
-         settled: bool = False, columns: str = '') -> Measurement: ...
+         settled: bool = False, columns: str = '',
+         settled_time: float | None = None) -> Measurement: ...
 
 
 @overload
 def read(path: AnyPath, second: AnyPath, /, *more: AnyPath, namespace: str | None = None,
-         settled: bool = False, columns: str = '') -> list[Measurement]: ...
+         settled: bool = False, columns: str = '',
+         settled_time: float | None = None) -> list[Measurement]: ...
 
 
 def read(*paths: AnyPath, namespace: str | None = None,
-         settled: bool = False, columns: str = '') -> Measurement | list[Measurement]:
+         settled: bool = False, columns: str = '',
+         settled_time: float | None = None) -> Measurement | list[Measurement]:
     """
     Read measurements: CSV files or rosbag2 recordings.
 
@@ -100,6 +103,9 @@ def read(*paths: AnyPath, namespace: str | None = None,
         Of a continuous run take only the ends of its holds.
     columns : str
         What the columns of tables mean, as ``--columns``: ``'angle=theta:deg,time=t_ms'``.
+    settled_time : float, optional
+        Time [s] for which the drive has to be held until muscle and arm have settled, 20 s by
+        default. Rows of a table that are so far apart are settled states.
 
     Returns
     -------
@@ -113,10 +119,12 @@ def read(*paths: AnyPath, namespace: str | None = None,
         If one is missing, is no measurement, or has no settled states.
 
     """
-    from hysteresis_ros.measurements import read_measurement
+    from hysteresis_ros.measurements import read_measurement, SETTLED_HOLD
     if not paths:
         raise MeasurementError('no measurement was given; name CSV files or bag folders')
-    found = [read_measurement(path, namespace, settled, columns) for path in paths]
+    found = [read_measurement(path, namespace, settled, columns,
+                              settled_time=SETTLED_HOLD if settled_time is None else settled_time)
+             for path in paths]
     return found[0] if len(found) == 1 else found
 
 

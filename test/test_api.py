@@ -146,8 +146,12 @@ def test_read_takes_settled_states(tmp_path):
     write_csv({**columns, 'voltage': time / 30.0}, tmp_path / 'ramp.csv')
     assert hr.read(tmp_path / 'held.csv', settled=True).rows == 4
     assert hr.read(tmp_path / 'held.csv').rows == len(time)
+    assert not hr.read(tmp_path / 'held.csv').settled
+    assert hr.read(tmp_path / 'held.csv', settled_time=0.5).settled
     with pytest.raises(MeasurementError, match='not held for 20 s .* from 0.0 s of trial 0 on'):
         hr.read(tmp_path / 'ramp.csv', settled=True)
+    with pytest.raises(MeasurementError, match='not held for 40 s'):
+        hr.read(tmp_path / 'held.csv', settled=True, settled_time=40.0)
 
 
 def test_data_may_be_paths_objects_or_columns(folder):

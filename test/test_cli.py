@@ -130,6 +130,16 @@ def test_settled_states_of_a_continuous_run(bench, tmp_path, capsys):
     write_csv({'time': time, 'voltage': time / 60, 'force': time}, tmp_path / 'ramp.csv')
     line = failed(['compare', *model, '--data', f'{tmp_path}/ramp.csv', '--settled'], capsys)
     assert 'no settled states' in line
+    # A wire that settles sooner.
+    held = [*model, '--data', f'{tmp_path}/fast.csv', '--settled']
+    write_csv({'time': time / 6, 'voltage': voltage, 'force': 1 + voltage}, tmp_path / 'fast.csv')
+    assert 'held for 20 s at a time' in failed(['compare', *held], capsys)
+    assert main(['compare', *held, '--settled-time', '4.5']) == 0
+    assert json.loads((tmp_path / 'j.json').read_text())['rows'] == 8
+    for wrong in ('0', 'inf', 'five'):
+        with pytest.raises(SystemExit):
+            main(['compare', *held, '--settled-time', wrong])
+        assert 'positive number of seconds' in capsys.readouterr().err
 
 
 def test_trials_that_are_not_looked_at_need_no_settled_states(bench, tmp_path, capsys):

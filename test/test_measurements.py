@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables: what their columns make them, their trials, settled rows, and what they refuse."""
 
+from dataclasses import replace
 import re
 
 from hypothesis import given, settings, strategies
@@ -59,6 +60,8 @@ def test_settled_needs_twenty_seconds_between_all_rows_of_a_trial():
     assert not Measurement.from_columns(arm(time=[0, 30, 60, 0, 19, 60])).settled
     assert Measurement.from_columns(arm(time=[0, 20, 40, 0, 20, 40])).settled
     assert Measurement.from_columns({'voltage': [0, 1], 'force': [0, 1]}).settled
+    slower = replace(Measurement.from_columns(arm(time=[0, 30, 60, 0, 30, 60])), settled_time=31.0)
+    assert not slower.settled and replace(slower, settled_time=30.0).settled
     assert Measurement.from_columns(
         {'time': [0, 0], 'trial': [0, 1], 'voltage': [0, 1], 'angle': [1, 1]}).settled
 
@@ -166,6 +169,16 @@ def test_settled_rows_take_the_end_of_every_hold():
 def test_settled_rows_average_noise_and_ignore_the_rounding_of_the_voltage():
     table = Measurement.from_columns(staircase([1, 3, 2, 2.5], 30.0, noise=5e-4))
     assert settled_rows(table).rows == 4
+
+
+def test_a_fast_wire_settles_sooner():
+    """Of a short hold no more is averaged than its last fifth."""
+    table = Measurement.from_columns(staircase([1, 3, 2, 2.5], 2.0))
+    assert settled_rows(replace(table, settled_time=2.1)) is None
+    ends = settled_rows(replace(table, settled_time=1.8))
+    assert ends.settled and list(ends.time) == pytest.approx([1.9, 3.9, 5.9, 7.9])
+    expected = np.array([1, 3, 2, 2.5]) + np.mean(np.exp(-np.arange(1.6, 1.95, 0.1)))
+    np.testing.assert_allclose(ends.column('angle'), expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize('levels, hold', [([1, 3, 2, 2.5], 15.0), (np.linspace(0, 5, 3000), 0.1)])

@@ -134,6 +134,9 @@ def test_the_options_that_read_a_recording_are_kept():
     assert found.command == "hysteresis compare 'a b'"
     assert found.reading[0] == '--columns' and parse_columns(found.reading[1]) == columns
     assert found.reading[2:] == ('--settled',)
+    args = build_parser(['compare']).parse_args([
+        'compare', '--model', 'm.yaml', '--data', 'a.csv', '--settled-time', '7.5'])
+    assert origin(args).reading == ('--settled-time', '7.5')
     assert origin(Namespace()) == Origin()
 
 

@@ -3,10 +3,12 @@
 """What several commands share: reading files, progress, writing results."""
 
 import argparse
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+import contextlib
 import csv
 import io
 import json
+import math
 import shlex
 import sys
 from typing import Any, TextIO, TYPE_CHECKING, TypeVar
@@ -16,13 +18,16 @@ import numpy as np
 from hysteresis_ros.atomic import AnyPath, write_text
 from hysteresis_ros.cli.outputs import InputPath, OutputFile, OutputFileOrStdout
 from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.measurements import Mapped, Measurement, parse_columns, read_measurement
+from hysteresis_ros.measurements import (
+    Mapped, Measurement, parse_columns, read_measurement, SETTLED_HOLD)
 
 if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
     from hysteresis_ros.report.provenance import Origin
 
 Item = TypeVar('Item')
+# Options that say how recordings are read, as `read_measurement` has them.
+READING = ('namespace', 'columns', 'settled', 'settled_time')
 # What `ArgumentParser.add_subparsers` returns; argparse has no public name for it.
 Subparsers = argparse._SubParsersAction
 
@@ -79,6 +84,14 @@ def seed(text: str) -> int:
     return int(text)
 
 
+def seconds(text: str) -> float:
+    """Return a positive time [s]."""
+    with contextlib.suppress(ValueError):
+        if 0.0 < float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f'{text!r} is not a positive number of seconds')
+
+
 def processes(text: str) -> int:
     """Return a positive number of processes, or -1 for one on each core."""
     return -1 if text == '-1' else count(text)
@@ -121,9 +134,13 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 
 def add_settled(parser: argparse.ArgumentParser) -> None:
-    """Add the option that reduces continuous runs to their settled states."""
+    """Add the options that say what is settled, and reduce continuous runs to that."""
     parser.add_argument('--settled', action='store_true',
                         help='of a continuous run take only the ends of its holds')
+    parser.add_argument('--settled-time', type=seconds, default=SETTLED_HOLD, metavar='S',
+                        help='how long the drive has to be held until muscle and arm have settled; '
+                        'rows of a table that are so far apart are settled states '
+                        f'(default: {SETTLED_HOLD:g} s)')
 
 
 def add_report(parser: argparse.ArgumentParser) -> None:
@@ -166,8 +183,7 @@ def divided(measurements: Sequence[Measurement], trials: Sequence[int] | None
     return taken, [one.select(names) for one, names in zip(measurements, rest) if names]
 
 
-def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
-             settled: bool = False, columns: Collection[Mapped] = (),
+def read_all(paths: Sequence[AnyPath], args: argparse.Namespace,
              trials: Sequence[int] | None = None) -> list[Measurement]:
     """
     Read measurements.
@@ -175,11 +191,8 @@ def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
     Parameters
     ----------
     paths : sequence of str
-    namespace : str, optional
-    settled : bool
-        Reduce continuous runs to the ends of their holds.
-    columns : collection of Mapped
-        What the columns of tables mean.
+    args : argparse.Namespace
+        With those of the options that say how recordings are read which the command has.
     trials : sequence of int, optional
         Those to look at.
 
@@ -193,7 +206,8 @@ def read_all(paths: Sequence[AnyPath], namespace: str | None = None,
         If one cannot be read, lacks a trial, or has no settled states.
 
     """
-    return [read_measurement(path, namespace, settled, columns, trials)
+    options = {name: value for name, value in vars(args).items() if name in READING}
+    return [read_measurement(path, trials=trials, **options)
             for path in progress(paths, 'reading')]
 
 
@@ -320,6 +334,8 @@ def origin(args: argparse.Namespace) -> 'Origin':
         reading += ['--columns', text.getvalue()]
     if getattr(args, 'settled', False):
         reading.append('--settled')
+    if getattr(args, 'settled_time', SETTLED_HOLD) != SETTLED_HOLD:
+        reading += ['--settled-time', f'{args.settled_time:g}']
     words = getattr(args, 'words', None)
     return Origin(shlex.join(['hysteresis', *words]) if words else '', tuple(reading))
 

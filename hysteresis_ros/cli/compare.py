@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> None:
 
     steps = Steps()
     model = MuscleModel.load(args.model)
-    measurements = read_all(args.data, args.namespace, args.settled, args.columns)
+    measurements = read_all(args.data, args)
     comparison = compare(model, measurements, steps)
     known = {note for measurement in measurements for note in measurement.warnings}
     steps.clear()

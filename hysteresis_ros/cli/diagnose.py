@@ -47,8 +47,7 @@ def run(args: argparse.Namespace) -> None:
     from hysteresis_ros.api import diagnose, load_model
 
     model = load_model(args.model)
-    measurements = read_all(
-        args.data, args.namespace, args.settled, args.columns, args.trials)
+    measurements = read_all(args.data, args, args.trials)
     rounds = Rounds(BENCH)
     found = diagnose(model, measurements, jobs=args.jobs, seed=args.seed, progress=rounds)
     rounds.close()

@@ -58,9 +58,8 @@ def run(args: argparse.Namespace) -> None:
     from hysteresis_ros.model import MuscleModel
 
     model = MuscleModel.load(args.model)
-    train, unseen = divided(
-        read_all(args.data, args.namespace, args.settled, args.columns), args.trials)
-    test = [*unseen, *read_all(args.test, args.namespace, args.settled, args.columns)]
+    train, unseen = divided(read_all(args.data, args), args.trials)
+    test = [*unseen, *read_all(args.test, args)]
     names = [name.strip() for name in args.add.split(',') if name.strip()]
     if args.values is None:
         extension = extend(model, names, train, test, force=args.force)

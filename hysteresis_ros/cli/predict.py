@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> None:
     if len(args.data) > 1:
         raise ParameterError('predict takes one measurement; call it once for each')
     model = MuscleModel.load(args.model)
-    measurement, = read_all(args.data, args.namespace, columns=args.columns)
+    measurement, = read_all(args.data, args)
     predicted = model.predict(measurement, method=args.method)
     write_csv({**measurement.columns, f'predicted_{measurement.response}': predicted},
               args.output)

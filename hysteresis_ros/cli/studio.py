@@ -88,7 +88,7 @@ def opened(args: argparse.Namespace, model: MuscleModel, path: str) -> Session:
     data, test = args.data, args.test
     if not data:
         data, test = example(args.output)
-    recordings = read_all([*data, *test], args.namespace, args.settled, args.columns)
+    recordings = read_all([*data, *test], args)
     os.makedirs(args.output, exist_ok=True)
     return Session(model, recordings, model_path=path, unseen=len(test) or None,
                    reading=origin(args).reading, folder=args.output)

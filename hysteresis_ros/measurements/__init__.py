@@ -3,6 +3,7 @@
 """Measurements: one table type, read from CSV files or rosbag2 recordings."""
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 import os
 from pathlib import Path
 
@@ -22,7 +23,8 @@ __all__ = [
 
 def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
                      settled: bool = False, columns: str | Collection[Mapped] = (),
-                     trials: Sequence[float] | None = None) -> Measurement:
+                     trials: Sequence[float] | None = None,
+                     settled_time: float = SETTLED_HOLD) -> Measurement:
     """
     Read a CSV file or a rosbag2 recording.
 
@@ -40,6 +42,9 @@ def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
         has topics and needs none.
     trials : sequence of float, optional
         Those to take; the others may be as they are.
+    settled_time : float
+        Time [s] for which the drive has to be held until muscle and arm have settled. Rows of a
+        table that are so far apart are settled states.
 
     Returns
     -------
@@ -56,13 +61,15 @@ def read_measurement(path: str | os.PathLike[str], namespace: str | None = None,
     if not path.exists():
         raise MeasurementError(f'{path}: no such file or folder')
     mapping = parse_columns(columns) if isinstance(columns, str) else columns
-    found = read_bag(path, namespace) if is_bag(path) else read_csv(path, mapping)
+    found = replace(read_bag(path, namespace) if is_bag(path) else read_csv(path, mapping),
+                    settled_time=settled_time)
     if trials is not None:
         found = found.select(trials)
     reduced = settled_rows(found) if settled else found
     if reduced is None:
         trial, time = not_held_since(found)
-        raise MeasurementError(f'{path}: the drive is not held for {SETTLED_HOLD:.0f} s at a time, '
+        raise MeasurementError(f'{path}: the drive is not held for {settled_time:g} s at a time, '
                                f'first from {time:.1f} s of trial {trial:g} on, so there are no '
-                               'settled states; take the whole run, without "settled"')
+                               'settled states; take the whole run, without "settled", or say by '
+                               '"settled time" if this arm settles sooner')
     return reduced

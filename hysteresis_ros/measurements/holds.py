@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from hysteresis_ros.measurements.table import SETTLED_HOLD
 import numpy as np
 
 if TYPE_CHECKING:
@@ -15,32 +14,30 @@ if TYPE_CHECKING:
 
 # Share of the drive's range that is no change: the board rounds a voltage that is held.
 TOLERANCE = 1e-3
+# Time [s] at the end of a hold that is averaged, and the largest share of a hold that this may be.
+AVERAGED, LARGEST_SHARE = 1.0, 0.2
 
 
-def settled_rows(measurement: Measurement, hold: float = SETTLED_HOLD,
-                 average: float = 1.0) -> Measurement | None:
+def settled_rows(measurement: Measurement) -> Measurement | None:
     """
     Take the settled state at the end of every hold of a continuous run.
 
     Parameters
     ----------
     measurement : Measurement
-        A run whose drive goes in steps.
-    hold : float
-        Only holds of at least this many seconds count as settled.
-    average : float
-        Seconds at the end of the hold that are averaged.
+        A run whose drive goes in steps; only holds of at least its `settled_time` count.
 
     Returns
     -------
     Measurement or None
-        One row a hold; `time` is the end of the hold. None if the drive is not held, because
-        such a run has no settled rows. A settled measurement is returned as it is.
+        One row a hold, the mean of its last second; `time` is the end of the hold. None if the
+        drive is not held, because such a run has no settled rows. A settled measurement is
+        returned as it is.
 
     """
     if measurement.settled:
         return measurement
-    windows = hold_ends(measurement, hold, average)
+    windows = hold_ends(measurement)
     if windows is None:
         return None
     exact = ('time', 'trial', 'step', measurement.drive)
@@ -49,8 +46,7 @@ def settled_rows(measurement: Measurement, hold: float = SETTLED_HOLD,
         for name, values in measurement.columns.items()})
 
 
-def hold_ends(measurement: Measurement, hold: float = SETTLED_HOLD,
-              average: float = 1.0) -> np.ndarray | None:
+def hold_ends(measurement: Measurement) -> np.ndarray | None:
     """
     Find the rows at the end of every hold.
 
@@ -58,8 +54,6 @@ def hold_ends(measurement: Measurement, hold: float = SETTLED_HOLD,
     ----------
     measurement : Measurement
         With times.
-    hold, average : float
-        As for `settled_rows`.
 
     Returns
     -------
@@ -70,11 +64,11 @@ def hold_ends(measurement: Measurement, hold: float = SETTLED_HOLD,
         not one that goes beyond.
 
     """
-    windows, elsewhere = _windows(measurement, hold, average)
+    windows, elsewhere = _windows(measurement)
     return np.array(windows) if windows and elsewhere is None else None
 
 
-def not_held_since(measurement: Measurement, hold: float = SETTLED_HOLD) -> tuple[float, float]:
+def not_held_since(measurement: Measurement) -> tuple[float, float]:
     """
     Return where the drive first goes its way without a hold, for a message.
 
@@ -82,8 +76,6 @@ def not_held_since(measurement: Measurement, hold: float = SETTLED_HOLD) -> tupl
     ----------
     measurement : Measurement
         A run of which `hold_ends` finds none.
-    hold : float
-        As for `settled_rows`.
 
     Returns
     -------
@@ -92,15 +84,17 @@ def not_held_since(measurement: Measurement, hold: float = SETTLED_HOLD) -> tupl
     time : float
         In that trial [s].
     """
-    trial, row = _windows(measurement, hold, 0.0)[1] or next(
+    trial, row = _windows(measurement)[1] or next(
         (trial, rows.start) for trial, rows in measurement.split())
     return trial, float(measurement.column('time')[row])
 
 
-def _windows(measurement: Measurement, hold: float, average: float
+def _windows(measurement: Measurement
              ) -> tuple[list[tuple[int, int]], tuple[float, int] | None]:
     """Return what `hold_ends` does, and trial and row from which holds are too short, or None."""
     time, drive = measurement.column('time'), measurement.column(measurement.drive)
+    hold = measurement.settled_time
+    average = min(AVERAGED, LARGEST_SHARE * hold)
     band = TOLERANCE * float(np.ptp(drive))
     found: list[tuple[int, int]] = []
     for trial, rows in measurement.split():

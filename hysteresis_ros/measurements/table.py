@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 SETTLED_HOLD = 20.0
-"""Rows of a run that are at least this many seconds apart are settled states."""
+"""Rows of a run that are at least this many seconds apart are settled states, by default."""
 TURN, ALMOST = 2.0 * np.pi, 0.1
 """A turn [rad], and the share of it that an arm moves from one row to the next while it wraps."""
 CALENDAR = 1e8
@@ -54,6 +54,8 @@ class Measurement:
         SHA-256 of that file or folder, hexadecimal; '' if the rows came from no file.
     warnings : tuple of str
         What looked wrong when it was read, one line each.
+    settled_time : float
+        Time [s] for which the drive has to be held until muscle and arm have settled.
 
     """
 
@@ -65,6 +67,7 @@ class Measurement:
     source: str = 'memory'
     digest: str = ''
     warnings: tuple = ()
+    settled_time: float = SETTLED_HOLD
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, ArrayLike], source: str = 'memory',
@@ -142,11 +145,11 @@ class Measurement:
 
     @property
     def settled(self) -> bool:
-        """Whether each row is a settled state: no time, or rows at least 20 s apart."""
+        """Whether each row is a settled state: no time, or rows so far apart."""
         if self.time is None:
             return True
         steps = np.diff(self.time)[np.diff(self.columns['trial']) == 0]
-        return bool(steps.size == 0 or steps.min() >= SETTLED_HOLD * (1 - 1e-6))
+        return bool(steps.size == 0 or steps.min() >= self.settled_time * (1 - 1e-6))
 
     def column(self, name: str) -> np.ndarray:
         """
