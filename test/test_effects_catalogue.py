@@ -192,6 +192,18 @@ def test_a_drift_that_begins_flat_is_a_drift():
     assert drift.implausible(duration=600.0) == []
 
 
+def test_a_small_rate_adds_up_in_a_long_recording():
+    """3 K in two hours: 0.025 V^2 in ten minutes, and a bend."""
+    drift = effect_of(bicep_model(), 'ambient_drift', rate=0.025, curvature=0.006)
+    assert drift.implausible(duration=7200.0) == []
+    assert drift.implausible(duration=600.0) == ['rate', 'curvature']
+    # Of it a tenth is no drift in two hours, either.
+    small = drift.with_values(rate=0.0025, curvature=0.00006)
+    assert small.implausible(duration=7200.0) == ['rate', 'curvature']
+    still = drift.with_values(rate=0.0, curvature=20.0)
+    assert 'curvature' in still.implausible(duration=7200.0)
+
+
 @pytest.mark.parametrize('values, duration, named', [
     ({'offset': 6.0, 'rate': 9.0, 'curvature': 6.0}, 600.0, ['total']),
     # An end of the recording within the range, and so the start, but not the change between them.

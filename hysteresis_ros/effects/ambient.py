@@ -94,10 +94,18 @@ class AmbientDrift(ThermalEffect):
         return [{'rate': -half}, {'rate': half}]
 
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
-        """Name also the total, where no room is as warm or changes as much in a recording."""
+        """
+        Name also the total, where no room is as warm or changes as much in a recording.
+
+        A rate that is small adds up in a recording that is long.
+        """
+        odd = super().implausible(slack, duration)
         total = self.total(np.linspace(0.0, duration, 101))
-        size = max(float(np.max(np.abs(total))), float(np.ptp(total)))
+        change = float(np.ptp(total))
+        offset, rate, _ = self.parameters
+        if change >= rate.low / (1.0 + slack):
+            odd = [name for name in odd if name not in self.together
+                   or abs(self.values[name]) > rate.low]
         # No more than the air at the start: 20 K.
-        offset = self.parameters[0]
-        return super().implausible(slack, duration) + (
-            ['total'] if size > offset.high * (1.0 + slack) else [])
+        size = max(float(np.max(np.abs(total))), change)
+        return odd + (['total'] if size > offset.high * (1.0 + slack) else [])
