@@ -343,6 +343,19 @@ def test_a_fold_is_predicted_by_a_step_no_longer_than_it_helps(loaded):
             (problem.measured - fit.predicted)[rows] ** 2)
 
 
+def test_what_changes_nothing_in_other_rows_stays_where_they_are_to_predict(loaded):
+    """Of the time of an event they say nothing; all else takes a step."""
+    effects = [neutral(loaded, name) for name in ('payload_error', 'encoder_offset')]
+    fit, = loaded.fit([effects], loaded.covariance.points[0], steps=0)
+    trained = loaded.problem.fold != loaded.problem.folds[0]
+    jacobian = fit.jacobian.copy()
+    jacobian[trained, 1] = 0.0
+    walk = _Walk(fit.effects, loaded.problem.kind)
+    walk.vector, walk.mean = fit.vector, fit.vector + 1.0
+    step = loaded._step(dataclasses.replace(fit, jacobian=jacobian), walk, trained)
+    assert step[1] == 0.0 and abs(step[0]) > 1e-3
+
+
 def test_the_rows_of_a_fold_do_not_help_to_predict_themselves(model, loaded):
     """Another angle in one trial changes what is foretold of the others only."""
     fit, = loaded.fit([[neutral(loaded, 'payload_error')]], loaded.covariance.points[0])

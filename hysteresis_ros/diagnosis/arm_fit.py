@@ -482,12 +482,17 @@ class Fitter:
         return found
 
     def _step(self, fit: Fit, walk: _Walk, train: np.ndarray) -> np.ndarray:
-        """Return the Gauss-Newton step towards the rows to train on, shape (k,)."""
+        """
+        Return the Gauss-Newton step towards the rows to train on, shape (k,).
+
+        What changes nothing in these stays: of the time of an event in other rows they say nothing.
+        """
         # Rows held out get no say; under the covariance of all rows that is a large noise.
         jacobian, residual = (fit.jacobian[train],
                               (self.problem.measured - fit.predicted)[train])
         matrix = jacobian.T @ jacobian
         variance = max(float(np.mean(residual ** 2)), 1e-300)
-        matrix = matrix / variance + np.diag(walk.spread ** -2.0)
         slope = jacobian.T @ residual / variance - (fit.vector - walk.mean) / walk.spread ** 2
+        slope[np.diag(matrix) == 0.0] = 0.0
+        matrix = matrix / variance + np.diag(walk.spread ** -2.0)
         return np.clip(np.linalg.solve(matrix, slope), -LONGEST, LONGEST)
