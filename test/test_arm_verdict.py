@@ -2,12 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is said of runs of an arm: which effects could have shown, and what an unknown one is."""
 
+import dataclasses
+
 from model_support import arm_run, bicep_model, effect_of
 import numpy as np
 import pytest
-from selection_support import recording
+from selection_support import heavier, recording
 
+from hysteresis_ros.diagnosis.arm_verdict import _Verdict
 from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.events import Event
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model.simulation import Simulator
 
@@ -35,3 +39,57 @@ def test_an_unknown_says_what_would_explain_most_of_it():
     assert (told.verdict, told.missing, told.explains_most) == ('unknown', [], ['payload_error'])
     assert 'payload_error shows best' in told.experiment.replace('what is like ', '')
     assert diagnose(model, [measured], ['payload_error', 'frame_tilt']).explains_most == []
+
+
+def test_a_single_row_that_is_wrong_is_named():
+    """A logger that reads the first row before the drive is on."""
+    model = bicep_model()
+    measured = recording(model)
+    angle = measured.column('angle').copy()
+    angle[30] += 0.8
+    told = diagnose(model, [Measurement.from_columns({**measured.columns, 'angle': angle})],
+                    ['payload_error', 'frame_tilt'])
+    assert told.verdict == 'unknown'
+    assert told.single_row == measured.time[29] + measured.time[30]
+    angle[[50, 70]] += 0.8
+    told = diagnose(model, [Measurement.from_columns({**measured.columns, 'angle': angle})],
+                    ['payload_error', 'frame_tilt'])
+    assert (told.verdict, told.single_row) == ('unknown', None)
+
+
+@pytest.fixture(scope='module')
+def verdict():
+    """Return the verdict on an arm that carries 15 g more."""
+    return _Verdict(heavier(bicep_model()))
+
+
+@pytest.mark.parametrize('other, chosen', [
+    # Twins that are together more probable than the set that is more probable than either.
+    (0.0, 'encoder_offset'),
+    # By 4 and by 6 % of what they explain.
+    (0.04, 'encoder_offset'), (0.06, 'frame_tilt')])
+def test_sets_that_cannot_be_told_apart_are_one_answer(verdict, monkeypatch, other, chosen):
+    sets = verdict.sets
+    base = sets.base.predicted
+    change = 0.1 * np.sin(np.arange(len(base)))
+    names = ('frame_tilt', 'encoder_offset', 'payload_error')
+    for name, response in zip(names, (-change, change, (1.0 + other) * change)):
+        key = frozenset([name])
+        monkeypatch.setitem(sets.fits, key, dataclasses.replace(
+            sets.fits[key], predicted=base + response))
+    shares = dict(zip(map(frozenset, ([name] for name in names)), (0.4, 0.35, 0.25)))
+    assert verdict._most_probable(shares) == frozenset([chosen])
+    # What holds more effects is no twin.
+    pair = frozenset(['frame_tilt', 'payload_error'])
+    monkeypatch.setitem(sets.fits, pair, sets.fits[frozenset(['encoder_offset'])])
+    assert not verdict._twins(pair, frozenset(['encoder_offset']))
+
+
+def test_an_event_that_leaves_too_much_needs_one_cause_more(verdict):
+    """As a set does: it is no more probable than the one that suffices, less the odds of that."""
+    best = frozenset(['payload_error'])
+    valid, log = [best], verdict.sets.log_posterior(best)
+    assert verdict.sets.sufficient(best)
+    for left, share in ((0.99, 1.0 - 1.0 / (1.0 + np.exp(2.0))), (1.01, verdict.settings.prior)):
+        event = Event(100.0, log + 2.0, left * verdict.sets.rmse_95)
+        assert verdict._probabilities(valid, event)['unknown'] == pytest.approx(share)

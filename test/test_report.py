@@ -196,6 +196,8 @@ def test_a_value_outside_its_range_is_warned_of(case, tmp_path):
     ('missing', {'missing': ['payload_error', 'backlash'], 'alternatives': [[], []]},
      ['Also missing: backlash', 'Adding them']),
     ('unknown', {'unexplained': 0.6, 'event': 1234.4}, ['60 %', 'happened 1234 s after']),
+    ('unknown', {'single_row': 1830.2, 'event': 1000.0},
+     ['single row, 1830 s after', 'leave it out']),
     ('unknown', {'unexplained': 0.6, 'signal': 'cycles'}, ['shows in cycles', '60 %']),
     ('unknown', {'uneven': True}, ['like noise', 'larger at some times']),
     ('unknown', {'resembles': ['end_stop', 'slack']}, ['like end_stop with slack', 'not physical']),

@@ -6,18 +6,19 @@ The verdict on runs of an arm, from the posterior probabilities of the sets of e
 A set with a larger residual than the base model's own error could be does not explain the
 recording: something unknown acts as well, whose probability beforehand is that of any effect, and
 the set's probability is that of an unknown cause. So is the probability of something that happened
-once.
+once. Sets that cannot be told apart are one answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 import math
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from hysteresis_ros.diagnosis import events, significance, verdict
+from hysteresis_ros.diagnosis.fitted_sets import rms
 from hysteresis_ros.diagnosis.kept_strain import kept_strain
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.residual import unexplained_signal
@@ -73,10 +74,10 @@ class _Verdict:
         """Judge the residual, and put all together."""
         selection, problem = self.selection, self.problem
         valid = self.sets.valid()
-        event, event_log = events.most_probable(problem, selection)
-        shares = self._probabilities(valid, event_log)
+        event = events.most_probable(problem, selection)
+        shares = self._probabilities(valid, event)
         unknown = shares.pop('unknown') > 0.5
-        chosen = frozenset() if unknown else max(shares, key=shares.__getitem__)
+        chosen = frozenset() if unknown else self._most_probable(shares)
         best = valid[0] if valid else frozenset()
         unobservable = {**selection.unobservable, **self._too_weak()}
         resembles = self._resembles(best) if unknown else []
@@ -89,7 +90,7 @@ class _Verdict:
         missing = [effect.id for effect in effects]
         kept = None if unknown else kept_strain(selection, self.sets.fits[chosen])
         to_add = missing or resembles or explains_most or ([kept['effect']] if kept else [])
-        happened = event if unknown and event_log > self._log_mass(valid) else None
+        happened = event.time if unknown and event.log_posterior > self._log_mass(valid) else None
         return verdict.Diagnosis(
             verdict=kind, missing=missing,
             alternatives=[alternatives[name] for name in missing],
@@ -100,11 +101,18 @@ class _Verdict:
             experiment=verdict.next_experiment(
                 kind, to_add, [alternatives[name] for name in missing], unobservable),
             effects=effects, rmse_before=before, rmse_after=after, not_excited=unobservable,
-            event=happened, resembles=resembles, explains_most=explains_most,
+            event=happened, single_row=self._single_row() if unknown else None,
+            resembles=resembles, explains_most=explains_most,
             uneven=unknown and self.sets.uneven(chosen),
             signal=unexplained_signal(problem, problem.measured - self.sets.fits[
                 chosen].predicted) if unknown else '',
             kept_strain=kept)
+
+    def _single_row(self) -> float | None:
+        """Return the time [s] of the row that has more than half of the residual's square."""
+        squares = (self.problem.measured - self.sets.base.predicted) ** 2
+        row = int(np.argmax(squares))
+        return float(self.problem.clock[row]) if 2.0 * squares[row] > np.sum(squares) else None
 
     def _in_order(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return effects, that first which explains most by itself."""
@@ -115,7 +123,21 @@ class _Verdict:
     def _log_mass(self, valid: Iterable[frozenset[str]]) -> float:
         return max((self.sets.log_posterior(names) for names in valid), default=-np.inf)
 
-    def _probabilities(self, valid: Sequence[frozenset[str]], event_log: float
+    def _most_probable(self, shares: Mapping[frozenset[str], float]) -> frozenset[str]:
+        """Return the most probable set of those that are most probable together."""
+        twins = {names: [other for other in shares if self._twins(names, other)]
+                 for names in shares}
+        best = max(shares, key=lambda names: sum(shares[other] for other in twins[names]))
+        return max(twins[best], key=shares.__getitem__)
+
+    def _twins(self, names: frozenset[str], other: frozenset[str]) -> bool:
+        """Whether sets of as many effects differ by less than matters of what they explain."""
+        if len(names) != len(other):
+            return False
+        own, its = (self.sets.fits[one].predicted for one in (names, other))
+        return rms(own - its) <= self.settings.practical * rms(own - self.sets.base.predicted)
+
+    def _probabilities(self, valid: Sequence[frozenset[str]], event: events.Event
                        ) -> dict[Any, float]:
         """Return the posterior probability of each set, and of 'unknown'."""
         # What does not suffice needs one cause more, as improbable as any other effect. Drift and
@@ -127,6 +149,8 @@ class _Verdict:
         weights = {names: (value if self.sets.sufficient(names)
                            else min(value, most) + further)
                    for names, value in logs.items()}
+        event_log = (event.log_posterior if event.left <= self.sets.rmse_95
+                     else min(event.log_posterior, most) + further)
         top = max([event_log, *weights.values()])
         mass = {names: math.exp(value - top) for names, value in weights.items()}
         unknown = math.exp(event_log - top)

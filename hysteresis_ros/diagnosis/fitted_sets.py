@@ -163,7 +163,7 @@ class FittedSets:
             residuals = [self.problem.measured - one for one in (fit.predicted, least)]
             own = map((fit.covariance or self.covariance).discrepancy.besides_kept, residuals)
             self._errors[names] = known = (
-                fit.predicted, min(map(_rms, residuals)), min(map(_rms, own)))
+                fit.predicted, min(map(rms, residuals)), min(map(rms, own)))
         return known
 
     def noise_free_rmse(self, names: frozenset[str]) -> float:
@@ -214,7 +214,7 @@ class FittedSets:
         fit = self.fits[names]
         known = self._predicts.get(names)
         if known is None or known[0] is not fit.predicted:
-            before, after, fitted = (_rms(self.problem.measured - response) ** 2 for response in (
+            before, after, fitted = (rms(self.problem.measured - response) ** 2 for response in (
                 self.base.predicted, self.fitter.cross_validate([fit])[0].held_out, fit.predicted))
             self._predicts[names] = known = (
                 fit.predicted, before - after > PREDICTED * (before - fitted))
@@ -312,7 +312,8 @@ class FittedSets:
         return odds >= -math.log(self.settings.reported)
 
 
-def _rms(residual: np.ndarray) -> float:
+def rms(residual: np.ndarray) -> float:
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(residual ** 2)))
 
 

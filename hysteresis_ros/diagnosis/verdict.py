@@ -65,6 +65,9 @@ class Diagnosis(Result):
         Time [s] at which something happened that lasts.
     signal : str
         Signal in which an unexplained residual shows.
+    single_row : float or None
+        Time [s], as `event`, of the one row that has more than half of an unexplained residual's
+        square: a reading that is wrong.
     uneven : bool
         Whether an unexplained residual is like noise, but larger at some times than at others.
     resembles : list of str
@@ -105,6 +108,7 @@ class Diagnosis(Result):
     not_excited: dict[str, str]
     event: float | None
     signal: str
+    single_row: float | None = None
     uneven: bool = False
     resembles: list[str] = dataclasses.field(default_factory=list)
     explains_most: list[str] = dataclasses.field(default_factory=list)

@@ -73,9 +73,12 @@ def _verdict(found: Diagnosis) -> str:
         else:
             text = ('Unknown: something acts here that no effect of the catalogue explains '
                     f'({100.0 * found.unexplained:.0f} % of the mean square error).')
-        if found.event is not None:
-            text += (f' It happened {found.event:.0f} s after the recording began, trial after '
-                     'trial, and lasts.')
+        if found.single_row is not None:
+            text += (' Most of the squared error is that of a single row, '
+                     f'{_when(found.single_row)}: look whether it is right, and leave it out if '
+                     'not.')
+        elif found.event is not None:
+            text += f' It happened {_when(found.event)}, and lasts.'
         elif found.signal:
             text += f' It shows in {found.signal}.'
         elif found.uneven:
@@ -87,6 +90,10 @@ def _verdict(found: Diagnosis) -> str:
                 'missing.')
     return ("Adequate: no effect of the catalogue explains more than chance and the base model's "
             'own error.')
+
+
+def _when(time: float) -> str:
+    return f'{time:.0f} s after the recording began, all trials counted'
 
 
 def short_name(name: str) -> str:
