@@ -11,7 +11,6 @@ from selection_support import heavier, recording
 
 from hysteresis_ros.diagnosis.arm_verdict import _Verdict
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.diagnosis.events import Event
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model.simulation import Simulator
 
@@ -83,13 +82,3 @@ def test_sets_that_cannot_be_told_apart_are_one_answer(verdict, monkeypatch, oth
     pair = frozenset(['frame_tilt', 'payload_error'])
     monkeypatch.setitem(sets.fits, pair, sets.fits[frozenset(['encoder_offset'])])
     assert not verdict._twins(pair, frozenset(['encoder_offset']))
-
-
-def test_an_event_that_leaves_too_much_needs_one_cause_more(verdict):
-    """As a set does: it is no more probable than the one that suffices, less the odds of that."""
-    best = frozenset(['payload_error'])
-    valid, log = [best], verdict.sets.log_posterior(best)
-    assert verdict.sets.sufficient(best)
-    for left, share in ((0.99, 1.0 - 1.0 / (1.0 + np.exp(2.0))), (1.01, verdict.settings.prior)):
-        event = Event(100.0, log + 2.0, left * verdict.sets.rmse_95)
-        assert verdict._probabilities(valid, event)['unknown'] == pytest.approx(share)

@@ -74,8 +74,8 @@ class _Verdict:
         """Judge the residual, and put all together."""
         selection, problem = self.selection, self.problem
         valid = self.sets.valid()
-        event = events.most_probable(problem, selection)
-        shares = self._probabilities(valid, event)
+        event, event_log = events.most_probable(problem, selection)
+        shares = self._probabilities(valid, event_log)
         unknown = shares.pop('unknown') > 0.5
         chosen = frozenset() if unknown else self._most_probable(shares)
         best = valid[0] if valid else frozenset()
@@ -90,7 +90,7 @@ class _Verdict:
         missing = [effect.id for effect in effects]
         kept = None if unknown else kept_strain(selection, self.sets.fits[chosen])
         to_add = missing or resembles or explains_most or ([kept['effect']] if kept else [])
-        happened = event.time if unknown and event.log_posterior > self._log_mass(valid) else None
+        happened = event if unknown and event_log > self._log_mass(valid) else None
         return verdict.Diagnosis(
             verdict=kind, missing=missing,
             alternatives=[alternatives[name] for name in missing],
@@ -137,7 +137,7 @@ class _Verdict:
         own, its = (self.sets.fits[one].predicted for one in (names, other))
         return rms(own - its) <= self.settings.practical * rms(own - self.sets.base.predicted)
 
-    def _probabilities(self, valid: Sequence[frozenset[str]], event: events.Event
+    def _probabilities(self, valid: Sequence[frozenset[str]], event_log: float
                        ) -> dict[Any, float]:
         """Return the posterior probability of each set, and of 'unknown'."""
         # What does not suffice needs one cause more, as improbable as any other effect. Drift and
@@ -149,8 +149,6 @@ class _Verdict:
         weights = {names: (value if self.sets.sufficient(names)
                            else min(value, most) + further)
                    for names, value in logs.items()}
-        event_log = (event.log_posterior if event.left <= self.sets.rmse_95
-                     else min(event.log_posterior, most) + further)
         top = max([event_log, *weights.values()])
         mass = {names: math.exp(value - top) for names, value in weights.items()}
         unknown = math.exp(event_log - top)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,21 +19,7 @@ if TYPE_CHECKING:
 MARGIN = 0.06
 
 
-class Event(NamedTuple):
-    """
-    Something that may have happened once.
-
-    `time` [s] since the first recording began is None for a recording that is too short,
-    `log_posterior` is on the scale of `FittedSets.log_posterior`, and `left` is the root mean
-    square of the residual without it, as `FittedSets.own_error`.
-    """
-
-    time: float | None
-    log_posterior: float
-    left: float
-
-
-def most_probable(problem: ArmProblem, selection: Selection) -> Event:
+def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | None, float]:
     """
     Return when something may have happened, and how probable that is against the sets of effects.
 
@@ -48,38 +34,41 @@ def most_probable(problem: ArmProblem, selection: Selection) -> Event:
 
     Returns
     -------
-    Event
+    time : float or None
+        Seconds since the first recording began; None for a recording that is too short.
+    log_posterior : float
+        On the scale of `FittedSets.log_posterior`.
     """
     count = len(problem.measured)
     margin = max(2, int(MARGIN * count))
     if count < 4 * margin:
-        return Event(None, -np.inf, np.inf)
+        return None, -np.inf
     residual = problem.measured - selection.sets.base.predicted
     rows = np.arange(margin, count - margin)
     steps = (np.arange(count)[:, None] >= rows[None, :]).astype(float)
     gain = sensitivity(problem, selection.fixed)
     shapes = [np.ones(count), gain / max(float(np.sqrt(np.mean(gain ** 2))), 1e-300)]
     prior = max(float(np.mean(residual ** 2)), 1e-300)
-    best, moment, left = -np.inf, rows[0], np.inf
+    best, moment = -np.inf, rows[0]
     # As any effect, it has to explain more than the base model's own error.
     own = selection.covariance.discrepancy.besides_kept(residual)
-    explained = [_explained(own, steps * shape[:, None]) for shape in shapes]
+    large = [_explained(own, steps * shape[:, None]) > selection.covariance.size ** 2
+             for shape in shapes]
     for point in selection.covariance.points:
         whitened = point.whiten(residual)
-        for shape, less in zip(shapes, explained):
+        for shape, explains in zip(shapes, large):
             columns = point.whiten(steps * shape[:, None])
             precision = np.sum(columns ** 2, axis=0) + 1.0 / prior
             slope = columns.T @ whitened
             size = slope / precision
             evidence = (point.log_density(whitened[:, None] - columns * size)
                         - 0.5 * size ** 2 / prior - 0.5 * np.log(precision * prior))
-            evidence[less <= selection.covariance.size ** 2] = -np.inf
+            evidence[~explains] = -np.inf
             index = int(np.argmax(evidence))
             if evidence[index] > best:
                 best, moment = float(evidence[index]), rows[index]
-                left = math.sqrt(max(float(np.mean(own ** 2) - less[index]), 0.0))
     total = best / selection.sets.temper + selection.sets.odds - math.log(len(rows) * len(shapes))
-    return Event(float(problem.clock[moment]), total, left)
+    return float(problem.clock[moment]), total
 
 
 def _explained(residual: np.ndarray, columns: np.ndarray) -> np.ndarray:
