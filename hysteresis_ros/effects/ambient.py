@@ -94,18 +94,21 @@ class AmbientDrift(ThermalEffect):
         return [{'rate': -half}, {'rate': half}]
 
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
-        """
-        Name also the total, where no room is as warm or changes as much in a recording.
-
-        A rate that is small adds up in a recording that is long.
-        """
-        odd = super().implausible(slack, duration)
-        total = self.total(np.linspace(0.0, duration, 101))
-        change = float(np.ptp(total))
-        offset, rate, _ = self.parameters
-        if change >= rate.low / (1.0 + slack):
-            odd = [name for name in odd if name not in self.together
-                   or abs(self.values[name]) > rate.low]
+        """Name also the total, where no room is as warm or changes as much in a recording."""
+        total = self._course(duration)
+        size = max(float(np.max(np.abs(total))), float(np.ptp(total)))
         # No more than the air at the start: 20 K.
-        size = max(float(np.max(np.abs(total))), change)
-        return odd + (['total'] if size > offset.high * (1.0 + slack) else [])
+        offset = self.parameters[0]
+        return super().implausible(slack, duration) + (
+            ['total'] if size > offset.high * (1.0 + slack) else [])
+
+    def size_together(self, duration: float) -> float:
+        """Return it with what a small rate adds up to in a long recording."""
+        rate = self.parameters[1]
+        return max(super().size_together(duration),
+                   float(np.ptp(self._course(duration))) / rate.low)
+
+    def _course(self, duration: float) -> np.ndarray:
+        """Return what the air adds [V^2] along a recording of a duration [s]."""
+        course: np.ndarray = self.total(np.linspace(0.0, duration, 101))
+        return course

@@ -336,12 +336,15 @@ class Effect(abc.ABC):
         odd = [parameter for parameter in self.parameters
                if self.values[parameter.name] != parameter.neutral
                and not parameter.plausible(self.values[parameter.name], slack)]
-        size = math.hypot(*(self.values[parameter.name] / parameter.low
-                            for parameter in self.parameters if parameter.name in self.together))
-        if size >= 1.0 / (1.0 + slack):
+        if self.size_together(duration) >= 1.0 / (1.0 + slack):
             odd = [parameter for parameter in odd if parameter.name not in self.together
                    or abs(self.values[parameter.name]) > parameter.low]
         return [parameter.name for parameter in odd]
+
+    def size_together(self, duration: float) -> float:
+        """Return the size of the parameters `together` over the least that is physical."""
+        return math.hypot(*(self.values[parameter.name] / parameter.low
+                            for parameter in self.parameters if parameter.name in self.together))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain types for the model file."""

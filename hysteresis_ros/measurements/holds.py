@@ -30,9 +30,9 @@ def settled_rows(measurement: Measurement) -> Measurement | None:
     Returns
     -------
     Measurement or None
-        One row a hold, the mean of its last second; `time` is the end of the hold. None if the
-        drive is not held, because such a run has no settled rows. A settled measurement is
-        returned as it is.
+        One row a hold, the mean of its last second, or fifth of the settled time if that is less;
+        `time` is the end of the hold. None if the drive is not held, because such a run has no
+        settled rows. A settled measurement is returned as it is.
 
     """
     if measurement.settled:
