@@ -21,7 +21,7 @@ def effects(*names, **values):
 
 
 def test_of_runs_with_the_same_effects_the_nearest_values_count():
-    known = KnownPhases(3)
+    known = KnownPhases(np.ones(3))
     for latent in (0.1, 0.2, 0.5):
         known.keep(effects('latent_heat', latent=latent), np.full(3, latent))
     for latent, nearest in ((0.05, 0.1), (0.22, 0.2), (0.19, 0.2), (1.0, 0.5)):
@@ -30,7 +30,7 @@ def test_of_runs_with_the_same_effects_the_nearest_values_count():
 
 
 def test_effects_that_never_acted_together_begin_where_most_of_them_did():
-    known = KnownPhases(2)
+    known = KnownPhases(np.ones(2))
     np.testing.assert_array_equal(known.nearest(effects('creep')), np.ones(2))
     known.keep(effects('latent_heat'), np.full(2, 0.3))
     known.keep(effects('creep'), np.full(2, 0.6))
@@ -42,7 +42,7 @@ def test_effects_that_never_acted_together_begin_where_most_of_them_did():
 
 def test_of_equal_runs_the_last_one_counts_and_the_first_are_forgotten(monkeypatch):
     monkeypatch.setattr(agreement, 'MOST_KEPT', 3)
-    known = KnownPhases(1)
+    known = KnownPhases(np.ones(1))
     sizes = (0.1, 0.2, 0.4, 0.4)
     for number, size in enumerate(sizes):
         known.keep(effects('latent_heat', latent=size), np.array([0.1 * number]))
@@ -86,7 +86,7 @@ def test_a_fit_is_near_the_arm_that_is_followed_row_by_row(latent, time_constant
 def test_a_copy_of_known_phases_knows_nothing_of_what_comes_later():
     model = bicep_model()
     one, other = effect_of(model, 'resistance_change'), effect_of(model, 'latent_heat')
-    known = KnownPhases(3)
+    known = KnownPhases(np.ones(3))
     known.keep([one], np.array([0.1, 0.2, 0.3]))
     before = known.copy()
     known.keep([one, other], np.array([0.4, 0.5, 0.6]))

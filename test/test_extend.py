@@ -5,7 +5,7 @@
 import json
 import math
 
-from model_support import arm_run, bicep_model, effect_of, wandering_voltage
+from model_support import arm_run, bicep_model, effect_of, runs, wandering_voltage
 import numpy as np
 import pytest
 
@@ -300,6 +300,16 @@ def test_trials_that_are_not_named_are_not_fitted(files, base, recordings):
     found = json.loads(open('new.json', encoding='utf-8').read())
     assert found['train']['rmse_before'] == pytest.approx(rmse(base, recordings[:1]))
     assert found['test']['rmse_before'] == pytest.approx(rmse(base, recordings[1:]))
+
+
+@pytest.mark.parametrize('name, values', [
+    ('wire_break', {'time': 2000.0}), ('ambient_drift', {'offset': 0.2, 'rate': 0.4}),
+    ('fatigue', {'b': -0.3, 'a': 0.0})])
+def test_what_happens_in_the_course_of_a_recording_holds_for_its_other_trials(base, name, values):
+    arm = base.with_effects([effect_of(base, name, **values)])
+    run = runs(arm, trials=4, rows=40)
+    found = extend(base, [name], [run.select([0, 1, 2])], [run.select([3])])
+    assert found.test['rmse_after'] < 0.1 * found.test['rmse_before']
 
 
 @pytest.mark.parametrize('words, status, line', [

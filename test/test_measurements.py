@@ -49,6 +49,19 @@ def test_trials_are_split_in_the_order_of_the_file():
     assert chosen.source == table.source
 
 
+def test_trials_that_are_not_taken_are_known_to_have_been():
+    table = Measurement.from_columns(arm(trial=[5, 5, 5, 2, 2, 2]))
+    assert table.part_of is None
+    assert table.select([2, 5]).part_of is None
+    chosen = table.select([2]).where(slice(1, None))
+    assert chosen.part_of is table
+    whole, taken = chosen.whole()
+    assert whole.part_of is None
+    assert list(whole.column('trial')) == [5, 5, 5, 2, 2]
+    assert list(whole.column('voltage')[taken]) == [2, 1] == list(chosen.column('voltage'))
+    assert list(taken) == [False, False, False, True, True]
+
+
 def test_selecting_a_trial_that_is_not_there_names_those_that_are():
     table = Measurement.from_columns(arm())
     with pytest.raises(MeasurementError, match='no trial 7; the table has trials 0, 3'):

@@ -15,7 +15,8 @@ from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import LinearModel, simulation, Simulator
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.trials import trials_of
-from model_support import arm_run, bicep_model, effect_of, GEOMETRY, STRENGTHS, wandering_voltage
+from model_support import (
+    arm_run, bicep_model, effect_of, GEOMETRY, runs, STRENGTHS, wandering_voltage)
 
 VOLTAGE = wandering_voltage(800, seed=2)
 STRONG = {'latent_heat': {'latent': 0.5}, 'creep': {'c': 0.3}, 'resistance_change': {'eta': 0.2}}
@@ -57,6 +58,18 @@ def test_the_first_settled_row_is_settled_even_at_time_zero():
     late, early = (model.predict(arm_run([4.0, 1.0], 30.0, first=first)) for first in (30.0, 0.0))
     np.testing.assert_allclose(early, late, atol=1e-9)
     assert late[0] < 1.7
+
+
+@pytest.mark.parametrize('settled', [False, True])
+@pytest.mark.parametrize('name', sorted(STRENGTHS))
+def test_trials_taken_from_a_recording_are_predicted_as_in_it(name, settled):
+    model = bicep_model()
+    whole = runs(model, trials=4, rows=30, dt=30.0 if settled else 5.0)
+    model = model.with_effects([effect_of(model, name)])
+    taken = whole.select([1, 3])
+    np.testing.assert_allclose(
+        model.predict(taken), model.predict(whole)[np.isin(whole.column('trial'), [1, 3])],
+        atol=1e-5)
 
 
 def test_memory_is_wiped_between_trials():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hidden_cases import found_in
+from hysteresis_ros.diagnosis.arm_problem import ArmProblem
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Air, Conditions
@@ -67,11 +68,23 @@ def test_it_yields_once_and_is_longer_from_then_on():
 def test_later_trials_begin_with_what_earlier_ones_left():
     run = runs(MODEL, trials=2, rows=40)
     found, again = (angles(yielding(), run) for _ in range(2))
-    alone = angles(yielding(), run.select([1]))
+    second = run.select([1])
+    alone = angles(yielding(), Measurement.from_columns(second.columns))
     np.testing.assert_array_equal(found, again)
     assert found[40] > alone[0] + 0.005
     # It is the largest load that counts, not how often it came.
     assert found[-1] == pytest.approx(alone[-1], abs=0.02)
+    # They have done so where only the later ones are looked at, too.
+    np.testing.assert_allclose(angles(yielding(), second), found[40:], atol=1e-12)
+
+
+@pytest.mark.parametrize('names', [(), ('latent_heat',)])
+def test_weights_move_only_the_rows_of_trials_that_were_taken(names):
+    run, model = runs(MODEL, trials=3, rows=40), yielding(*names)
+    whole = ArmProblem(model, [run]).weight_columns(model.effects)
+    part = ArmProblem(model, [run.select([1, 2])]).weight_columns(model.effects)
+    assert part.shape == (80, whole.shape[1])
+    np.testing.assert_allclose(part, whole[40:], atol=1e-4 * np.max(np.abs(whole)))
 
 
 @pytest.mark.parametrize('dt', [0.1, 30.0])

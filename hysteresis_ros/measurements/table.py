@@ -56,6 +56,8 @@ class Measurement:
         What looked wrong when it was read, one line each.
     settled_time : float
         Time [s] for which the drive has to be held until muscle and arm have settled.
+    part_of : Measurement or None
+        The recording that trials were taken from; None if they are all here.
 
     """
 
@@ -68,11 +70,12 @@ class Measurement:
     digest: str = ''
     warnings: tuple = ()
     settled_time: float = SETTLED_HOLD
+    part_of: Measurement | None = field(default=None, repr=False)
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, ArrayLike], source: str = 'memory',
                      digest: str = '', warnings: Iterable[str] = (),
-                     origin: 'Mapping[str, Column] | None' = None) -> 'Measurement':
+                     origin: Mapping[str, Column] | None = None) -> Measurement:
         """
         Build a measurement from columns; their names say what it is.
 
@@ -188,9 +191,9 @@ class Measurement:
         return [(float(values[low]), slice(int(low), int(high)))
                 for low, high in zip(starts[:-1], starts[1:])]
 
-    def select(self, trials: Iterable[float]) -> 'Measurement':
+    def select(self, trials: Iterable[float]) -> Measurement:
         """
-        Return the rows of some trials.
+        Return the rows of some trials, whose others are `part_of` it.
 
         Parameters
         ----------
@@ -214,9 +217,11 @@ class Measurement:
                 f'{trial_list(self.trials)}')
         return self.where(np.isin(self.columns['trial'], wanted))
 
-    def where(self, rows: np.ndarray | slice) -> 'Measurement':
+    def where(self, rows: np.ndarray | slice) -> Measurement:
         """
         Return some rows.
+
+        Trials of which none is left have happened none the less, and are `part_of` it.
 
         Parameters
         ----------
@@ -227,7 +232,33 @@ class Measurement:
         Measurement
 
         """
-        return replace(self, columns={name: values[rows] for name, values in self.columns.items()})
+        found = replace(self, columns={
+            name: values[rows] for name, values in self.columns.items()})
+        if self.part_of is None and len(found.trials) < len(self.trials):
+            return replace(found, part_of=self)
+        return found
+
+    def whole(self) -> tuple[Measurement, np.ndarray]:
+        """
+        Return the rows with the trials that were not taken, and which of them are these.
+
+        Returns
+        -------
+        Measurement
+        ndarray of bool
+            One for each of its rows.
+
+        """
+        if self.part_of is None:
+            return self, np.ones(self.rows, dtype=bool)
+        own = dict(self.split())
+        parts = [(self, own[trial]) if trial in own else (self.part_of, rows)
+                 for trial, rows in self.part_of.split()]
+        taken = np.concatenate([
+            np.full(rows.stop - rows.start, table is self) for table, rows in parts])
+        return replace(self, part_of=None, columns={
+            name: np.concatenate([table.columns[name][rows] for table, rows in parts])
+            for name in self.columns}), taken
 
 
 def classify(columns: Collection[str], source: str) -> tuple[str, str, str, str | None]:

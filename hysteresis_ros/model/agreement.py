@@ -37,11 +37,12 @@ class KnownPhases:
 
     Parameters
     ----------
-    rows : int
+    phase : ndarray, shape (rows,)
+        That to begin with.
     """
 
-    def __init__(self, rows: int) -> None:
-        self._phases: deque[np.ndarray] = deque([np.ones(rows)], MOST_KEPT)
+    def __init__(self, phase: np.ndarray) -> None:
+        self._phases: deque[np.ndarray] = deque([phase], MOST_KEPT)
         # Of each run the values of all parameters that have occurred, NaN of those absent.
         self._places: dict[tuple[str, str], int] = {}
         self._values = np.zeros((1, 0))

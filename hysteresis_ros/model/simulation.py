@@ -96,6 +96,10 @@ class Simulator:
         self.model = model
         self.measurement = measurement
         self.trials = trials_of(model, measurement)
+        self._whole: tuple[Simulator, np.ndarray] | None = None
+        if measurement.part_of is not None:
+            whole, taken = measurement.whole()
+            self._whole = Simulator(model, whole), taken
         self._before = list(before or ())
         self._onset = (rows_before(measurement)
                        if before is not None and measurement.response == 'angle' else 0)
@@ -106,7 +110,7 @@ class Simulator:
             self._asked[judged] = True
         self._surroundings = model.surroundings
         self._balances: dict[tuple, ArmBalance] = {}
-        self.known_phases = KnownPhases(measurement.rows)
+        self.known_phases = KnownPhases(np.ones(measurement.rows))
         self._statics = None
         if measurement.response == 'angle' and model.geometry is not None:
             self._statics = statics_of(model.geometry)
@@ -152,6 +156,8 @@ class Simulator:
             The martensite share, where effects need it.
         """
         chain = Chain(effects, self._surroundings)
+        if chain.yields[0] < np.inf and self._whole is not None:
+            return self._run_whole(*self._whole, effects, inputs_of_stage, exact)
         past = self.past(effects)
         respond = self._responder(chain, exact, past)
         result = np.empty(self.measurement.rows)
@@ -181,6 +187,22 @@ class Simulator:
             if inputs_of_stage is not None and response.inputs is not None:
                 inputs_of_stage.append(response.inputs)
         return result, phase
+
+    def _run_whole(self, whole: Simulator, taken: np.ndarray, effects: Sequence[Effect],
+                   inputs_of_stage: list[np.ndarray] | None, exact: bool
+                   ) -> tuple[np.ndarray, np.ndarray | None]:
+        """Simulate what the trials that were not taken leave behind, too; see `run_apart`."""
+        known = np.ones(len(taken))
+        known[taken] = self.known_phases.nearest(effects)
+        # Each thread begins with phases of its own.
+        simulator = copy.copy(whole)
+        simulator.known_phases = KnownPhases(known)
+        of_trials: list[np.ndarray] = []
+        response, phase = simulator.run_apart(effects, of_trials, exact)
+        if inputs_of_stage is not None:
+            inputs_of_stage += [inputs for trial, inputs in zip(simulator.trials, of_trials)
+                                if taken[trial.rows.start]]
+        return response[taken], None if phase is None else phase[taken]
 
     def past(self, effects: Sequence[Effect]) -> Past | None:
         """Return what the arm has done before the onset, None if these effects always act."""

@@ -43,38 +43,42 @@ def trials_of(model: MuscleModel, measurement: Measurement) -> list[Trial]:
     Returns
     -------
     list of Trial
-        In the order of the table; `Inputs.clock` and `Inputs.cycles` run on from one to the next.
+        In the order of the table; `Inputs.clock` and `Inputs.cycles` run on from one to the next,
+        also over trials of the recording that are not in the measurement.
 
     Raises
     ------
     MeasurementError
         If the table lacks the model's drive.
     """
-    drive = measurement.column(model.drive)
-    known = (measurement.columns.get(model.load_name) if model.load_name else None)
-    load = np.zeros(measurement.rows) if known is None else known
-    ambient, supply = (measurement.columns.get(name, np.full(measurement.rows, np.nan))
-                       for name in ('ambient_temperature', 'supply_voltage'))
+    own = dict(measurement.split())
+    recording = measurement.part_of or measurement
     low, high = model.ranges.get(model.drive, (0.0, 1.0))
     trials, clock, travel = [], 0.0, 0.0
-    for _, rows in measurement.split():
-        values = drive[rows]
-        count = len(values)
-        if measurement.time is None:
-            time = HOLD * np.arange(1, count + 1)
-        else:
-            time = measurement.time[rows]
-        dt = np.diff(time, prepend=0.0)
-        if measurement.settled:
-            # The first row is a settled state, too, even where its time is 0.
-            dt[0] = max(dt[0], HOLD)
-        travelled = travel + np.cumsum(np.abs(np.diff(values, prepend=model.cold_drive)))
-        inputs = Inputs(
-            time=time, clock=clock + time, dt=dt,
-            ambient=ambient[rows], phase=np.full(count, np.nan),
-            cycles=travelled / (2.0 * max(high - low, 1e-12)), supply=supply[rows],
-            load=load[rows] if known is not None else np.full(count, np.nan))
-        trials.append(Trial(rows, values, load[rows], inputs))
+    for name, whole in recording.split():
+        table, rows = (measurement, own[name]) if name in own else (recording, whole)
+        drive = table.column(model.drive)[rows]
+        time, dt = _time_of(table, rows)
+        travelled = travel + np.cumsum(np.abs(np.diff(drive, prepend=model.cold_drive)))
+        if name in own:
+            unknown = np.full(len(drive), np.nan)
+            load, ambient, supply = (
+                unknown if table.columns.get(column) is None else table.columns[column][rows]
+                for column in (model.load_name, 'ambient_temperature', 'supply_voltage'))
+            trials.append(Trial(rows, drive, 0.0 * drive if load is unknown else load, Inputs(
+                time=time, clock=clock + time, dt=dt, ambient=ambient, phase=unknown,
+                cycles=travelled / (2.0 * max(high - low, 1e-12)), supply=supply, load=load)))
         clock += float(time[-1])
         travel = float(travelled[-1])
     return trials
+
+
+def _time_of(table: Measurement, rows: slice) -> tuple[np.ndarray, np.ndarray]:
+    """Return the time [s] from the start of a trial and since the row before, each (rows,)."""
+    time = (HOLD * np.arange(1, rows.stop - rows.start + 1) if table.time is None
+            else table.time[rows])
+    dt = np.diff(time, prepend=0.0)
+    if table.settled:
+        # The first row is a settled state, too, even where its time is 0.
+        dt[0] = max(dt[0], HOLD)
+    return time, dt
