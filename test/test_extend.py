@@ -312,6 +312,22 @@ def test_what_happens_in_the_course_of_a_recording_holds_for_its_other_trials(ba
     assert found.test['rmse_after'] < 0.1 * found.test['rmse_before']
 
 
+@pytest.mark.parametrize('names', [
+    ('wire_break', 'backlash'), ('wire_break', 'coulomb_friction'), ('wire_break', 'fatigue')])
+@pytest.mark.parametrize('turned', [False, True])
+def test_the_order_in_which_effects_are_added_does_not_matter_in_the_end(base, names, turned):
+    arm = base.with_effects([
+        effect_of(base, 'wire_break', time=3200.0), effect_of(base, names[1])])
+    run = runs(arm, trials=3, rows=40)
+    measured = run.column('angle') + 2e-3 * np.random.default_rng(1).standard_normal(run.rows)
+    run = Measurement.from_columns({**run.columns, 'angle': measured})
+    names = names[::-1] if turned else names
+    found = extend(base, names, [run])
+    assert [effect.id for effect in found.added] == list(names)
+    assert list(found.model.effects[0].values) == list(found.added[0].values)
+    assert found.train['rmse_after'] < 2.5e-3
+
+
 @pytest.mark.parametrize('words, status, line', [
     (['--values', 'slack.Ls=1'], 1, 'gives no value to payload_error'),
     (['--values', 'payload_error.dm=1,slack.Ls=1'], 1, 'does not name slack'),

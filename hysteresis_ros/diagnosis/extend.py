@@ -379,10 +379,14 @@ def _on_arm(problem: ArmProblem, model: MuscleModel, classes: Sequence[type[Effe
     selection = Selection(problem, Settings(), np.random.default_rng(0), lambda items, total: items)
     fit = selection.sets.base
     found: list[Fitted] = []
-    for kind in classes:
+    for number, kind in enumerate(classes, 1):
         fit = selection.add(fit, present(model, kind))
+        if number == len(classes) > 1:
+            fit = selection.each_anew(fit)
         best = selection.fitter.least_squares(fit)
-        found.append((selection.fitter.with_intervals(best), best.implausible()))
+        added = sorted(selection.fitter.with_intervals(best),
+                       key=lambda effect: classes.index(type(effect)))
+        found.append((added, best.implausible()))
     return found
 
 

@@ -232,6 +232,18 @@ class Selection:
         self.covariance.add(values)
         return self.fitter.refined(best, values)
 
+    def each_anew(self, fit: Fit) -> Fit:
+        """
+        Return the best fit in which each effect has begun anew beside the others.
+
+        What an effect was fitted to before the others came may be far from what it is with them.
+        """
+        for effect in fit.effects:
+            kept = [one for one in fit.effects if one.id != effect.id]
+            for rest in self.fitter.fit([kept], self.fitting.metric, 0):
+                fit = max(fit, self.add(rest, effect), key=lambda one: one.log_evidence)
+        return fit
+
     def starts_of(self, effect: Effect, fit: Fit) -> list[Effect]:
         """Return where to start an effect together with those of a fit."""
         problem = self.problem
