@@ -53,13 +53,18 @@ def test_trials_that_are_not_taken_are_known_to_have_been():
     table = Measurement.from_columns(arm(trial=[5, 5, 5, 2, 2, 2]))
     assert table.part_of is None
     assert table.select([2, 5]).part_of is None
+    assert table.where(slice(1, None)).select([5, 2]).part_of is None
     chosen = table.select([2]).where(slice(1, None))
+    chosen.columns['predicted_angle'] = np.zeros(2)
     assert chosen.part_of is table
     whole, taken = chosen.whole()
     assert whole.part_of is None
     assert list(whole.column('trial')) == [5, 5, 5, 2, 2]
     assert list(whole.column('voltage')[taken]) == [2, 1] == list(chosen.column('voltage'))
     assert list(taken) == [False, False, False, True, True]
+    again = Measurement.from_columns(arm(
+        trial=[5, 5, 1, 2, 2, 2], time=[0, 30, 0, 0, 30, 60])).select([1, 2]).select([2])
+    assert list(again.part_of.trials) == [5, 1, 2]
 
 
 def test_selecting_a_trial_that_is_not_there_names_those_that_are():
@@ -182,6 +187,17 @@ def test_settled_rows_take_the_end_of_every_hold():
 def test_settled_rows_average_noise_and_ignore_the_rounding_of_the_voltage():
     table = Measurement.from_columns(staircase([1, 3, 2, 2.5], 30.0, noise=5e-4))
     assert settled_rows(table).rows == 4
+
+
+def test_a_trial_without_holds_has_been_before_the_settled_rows():
+    first, second = staircase([1, 3], 5.0), staircase([1, 3, 2], 30.0)
+    table = Measurement.from_columns({
+        **{name: np.concatenate((first[name], second[name])) for name in first},
+        'trial': np.repeat([0.0, 1.0], [len(first['time']), len(second['time'])])})
+    for ends in (settled_rows(table), settled_rows(table.select([1]))):
+        assert list(ends.column('voltage')) == [1, 3, 2]
+        assert ends.part_of is table
+        assert ends.whole()[0].rows == len(first['time']) + 3
 
 
 def test_a_fast_wire_settles_sooner():

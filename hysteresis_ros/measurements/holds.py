@@ -41,9 +41,9 @@ def settled_rows(measurement: Measurement) -> Measurement | None:
     if windows is None:
         return None
     exact = ('time', 'trial', 'step', measurement.drive)
-    others = measurement.part_of and (settled_rows(measurement.part_of) or measurement.part_of)
-    return replace(measurement, part_of=others, columns={
-        name: values[windows[:, 1] - 1] if name in exact else mean_of_windows(values, windows)
+    ends = measurement.where(windows[:, 1] - 1)
+    return replace(ends, columns={
+        name: ends.columns[name] if name in exact else mean_of_windows(values, windows)
         for name, values in measurement.columns.items()})
 
 

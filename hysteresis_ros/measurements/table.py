@@ -245,6 +245,7 @@ class Measurement:
         Returns
         -------
         Measurement
+            With the columns that both have.
         ndarray of bool
             One for each of its rows.
 
@@ -258,7 +259,7 @@ class Measurement:
             np.full(rows.stop - rows.start, table is self) for table, rows in parts])
         return replace(self, part_of=None, columns={
             name: np.concatenate([table.columns[name][rows] for table, rows in parts])
-            for name in self.columns}), taken
+            for name in self.columns if name in self.part_of.columns}), taken
 
 
 def classify(columns: Collection[str], source: str) -> tuple[str, str, str, str | None]:

@@ -156,7 +156,7 @@ class Simulator:
             The martensite share, where effects need it.
         """
         chain = Chain(effects, self._surroundings)
-        if chain.yields[0] < np.inf and self._whole is not None:
+        if chain.yields[0] < np.inf and self._whole is not None and not self._onset:
             return self._run_whole(*self._whole, effects, inputs_of_stage, exact)
         past = self.past(effects)
         respond = self._responder(chain, exact, past)

@@ -53,14 +53,19 @@ def trials_of(model: MuscleModel, measurement: Measurement) -> list[Trial]:
     """
     own = dict(measurement.split())
     recording = measurement.part_of or measurement
+    settled = measurement.settled
     low, high = model.ranges.get(model.drive, (0.0, 1.0))
     trials, clock, travel = [], 0.0, 0.0
     for name, whole in recording.split():
         table, rows = (measurement, own[name]) if name in own else (recording, whole)
         drive = table.column(model.drive)[rows]
-        time, dt = _time_of(table, rows)
+        time = HOLD * np.arange(1, len(drive) + 1) if table.time is None else table.time[rows]
         travelled = travel + np.cumsum(np.abs(np.diff(drive, prepend=model.cold_drive)))
         if name in own:
+            dt = np.diff(time, prepend=0.0)
+            if settled:
+                # The first row is a settled state, too, even where its time is 0.
+                dt[0] = max(dt[0], HOLD)
             unknown = np.full(len(drive), np.nan)
             load, ambient, supply = (
                 unknown if table.columns.get(column) is None else table.columns[column][rows]
@@ -71,14 +76,3 @@ def trials_of(model: MuscleModel, measurement: Measurement) -> list[Trial]:
         clock += float(time[-1])
         travel = float(travelled[-1])
     return trials
-
-
-def _time_of(table: Measurement, rows: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Return the time [s] from the start of a trial and since the row before, each (rows,)."""
-    time = (HOLD * np.arange(1, rows.stop - rows.start + 1) if table.time is None
-            else table.time[rows])
-    dt = np.diff(time, prepend=0.0)
-    if table.settled:
-        # The first row is a settled state, too, even where its time is 0.
-        dt[0] = max(dt[0], HOLD)
-    return time, dt
