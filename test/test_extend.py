@@ -300,6 +300,11 @@ def test_trials_that_are_not_named_are_not_fitted(files, base, recordings):
     found = json.loads(open('new.json', encoding='utf-8').read())
     assert found['train']['rmse_before'] == pytest.approx(rmse(base, recordings[:1]))
     assert found['test']['rmse_before'] == pytest.approx(rmse(base, recordings[1:]))
+    assert main(['compare', '--model', 'new.yaml', '--data', 'both.csv', '--trials', '1',
+                 '--json', 'compared.json']) == 0
+    compared = json.loads(open('compared.json', encoding='utf-8').read())
+    assert compared['extensions'][-1]['rmse'] == pytest.approx(found['test']['rmse_after'])
+    assert compared['rows'] == recordings[1].rows
 
 
 @pytest.mark.parametrize('name, values', [

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from hysteresis_ros.atomic import write_bytes, write_text
 from hysteresis_ros.cli.common import (
-    add_data, add_json, add_model, add_report, add_settled, origin, read_all, say, Steps,
-    Subparsers, warn, warn_of_loads, write_json)
+    add_data, add_json, add_model, add_report, add_settled, add_trials, origin, read_all, say,
+    Steps, Subparsers, warn, warn_of_loads, write_json)
 from hysteresis_ros.cli.outputs import OutputFolder
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     add_model(parser)
     add_data(parser)
     add_settled(parser)
+    add_trials(parser, 'the others are not looked at')
     add_json(parser)
     add_report(parser)
     parser.add_argument('--plots', type=PicturesFolder, metavar='DIR',
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> None:
 
     steps = Steps()
     model = MuscleModel.load(args.model)
-    measurements = read_all(args.data, args)
+    measurements = read_all(args.data, args, args.trials)
     comparison = compare(model, measurements, steps)
     known = {note for measurement in measurements for note in measurement.warnings}
     steps.clear()
