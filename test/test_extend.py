@@ -294,14 +294,16 @@ def test_a_drift_given_by_hand_is_implausible_if_it_adds_up_to_too_much(base, re
         assert [one for one in found.implausible if one.endswith('total')] == named
 
 
-def test_trials_that_are_not_named_are_not_fitted(files, base, recordings):
+def test_trials_that_are_not_named_are_not_fitted(files, base, recordings, capsys):
     assert main([*files, '--add', 'payload_error', '--values', 'payload_error.dm=10',
                  '--trials', '0']) == 0
     found = json.loads(open('new.json', encoding='utf-8').read())
     assert found['train']['rmse_before'] == pytest.approx(rmse(base, recordings[:1]))
     assert found['test']['rmse_before'] == pytest.approx(rmse(base, recordings[1:]))
+    capsys.readouterr()
     assert main(['compare', '--model', 'new.yaml', '--data', 'both.csv', '--trials', '1',
                  '--json', 'compared.json']) == 0
+    assert f'{recordings[1].rows} rows of 1 trial,' in capsys.readouterr().out
     compared = json.loads(open('compared.json', encoding='utf-8').read())
     assert compared['extensions'][-1]['rmse'] == pytest.approx(found['test']['rmse_after'])
     assert compared['rows'] == recordings[1].rows

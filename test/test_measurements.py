@@ -49,7 +49,7 @@ def test_trials_are_split_in_the_order_of_the_file():
     assert chosen.source == table.source
 
 
-def test_trials_that_are_not_taken_are_known_to_have_been():
+def test_selected_trials_know_the_recording_that_they_are_part_of():
     table = Measurement.from_columns(arm(trial=[5, 5, 5, 2, 2, 2]))
     assert table.part_of is None
     assert table.select([2, 5]).part_of is None

@@ -137,7 +137,7 @@ class Comparison(Result):
         if self.linear is not None:
             others.insert(0, f'linear {number(scale * self.linear.rmse)} {unit}')
         lines = [f'Comparison of {self.name}: {self.quantity}, {self.rows} rows of '
-                 f'{len(self.by_trial)} trials',
+                 + self._trials_in_words(),
                  f'RMSE {number(scale * self.model.rmse)} {unit} ({", ".join(others)})']
         lines += [f'where: {region.text}' for region in self.where[:1]]
         return Brief(lines, *self.table())
@@ -200,11 +200,15 @@ class Comparison(Result):
             rows.append(row(f'{self.name}, {ends}', self.settled['model']))
         return header, rows
 
+    def _trials_in_words(self) -> str:
+        count = len(self.by_trial)
+        return f'{count} trial' if count == 1 else f'{count} trials'
+
     def to_text(self) -> str:
         """Return the table and where the model fails, for a terminal."""
         header, rows = self.table()
         what = 'continuous run' if self.continuous else 'settled states'
-        lines = [f'{self.quantity}: {self.rows} rows of {len(self.by_trial)} trials, {what}, from '
+        lines = [f'{self.quantity}: {self.rows} rows of {self._trials_in_words()}, {what}, from '
                  f'{", ".join(os.path.basename(os.path.normpath(s)) for s in self.sources)}', '']
         lines += layout([header, *rows])
         unit, scale = shown(self.quantity)

@@ -239,8 +239,8 @@ class Selection:
         What an effect was fitted to before the others came may be far from what it is with them.
         """
         for effect in fit.effects:
-            kept = [one for one in fit.effects if one.id != effect.id]
-            for rest in self.fitter.fit([kept], self.fitting.metric, 0):
+            others = [one for one in fit.effects if one.id != effect.id]
+            for rest in self.fitter.fit([others], self.fitting.metric, 0):
                 fit = max(fit, self.add(rest, effect), key=lambda one: one.log_evidence)
         return fit
 
