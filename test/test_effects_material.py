@@ -219,11 +219,11 @@ def test_creep_goes_on_with_the_logarithm_of_time_in_the_direction_of_the_step()
     trial = inputs([1.0, 2.0, 7.0, 8.0, 12.0], phase=[0.4, 0.4, 0.4, 0.7, 0.7])
     offset, factor = made.drift(volts, volts ** 2, trial, WIRE)
     unit = 0.001 * 0.27
+    first = -unit * 0.6 * np.log1p(np.array([1.0, 2.0, 7.0]) / 2.0)
     # The strain of the first step fades while the second creeps.
-    left = -unit * 0.6 * math.log1p(6.0 / 2.0)
-    expected = [0.0, -unit * 0.6 * math.log1p(1.0 / 2.0), left,
-                left, left * math.exp(-2.0 * 4.0 / 2.0) + unit * 0.3 * math.log1p(4.0 / 2.0)]
-    np.testing.assert_allclose(offset, expected, atol=1e-18)
+    second = first[2] * np.exp(-2.0 * np.array([1.0, 5.0]) / 2.0) + unit * 0.3 * np.log1p(
+        np.array([1.0, 5.0]) / 2.0)
+    np.testing.assert_allclose(offset, [*first, *second], atol=1e-18)
     assert np.all(factor == 1.0)
 
 
@@ -232,7 +232,18 @@ def test_a_ramp_of_small_steps_creeps_like_its_whole():
     volts = np.array([0.5, 1.0, 1.5, 2.0, 2.0])
     trial = inputs([1, 2, 3, 4, 9], phase=[1.0, 0.9, 0.7, 0.6, 0.6])
     offset, _ = made.drift(volts, volts ** 2, trial, WIRE)
-    assert offset[-1] == pytest.approx(-0.001 * 0.27 * 0.4 * math.log1p(5.0 / 2.0))
+    assert offset[-1] == pytest.approx(-0.001 * 0.27 * 0.4 * math.log1p(6.0 / 2.0))
+
+
+def test_settled_rows_creep_each_from_its_own_step():
+    """Ends of holds of 30 s, between which the drive goes up and up, is held once, and falls."""
+    made = effect('creep', c=0.1, t0=2.0)
+    volts = np.array([2.0, 3.0, 4.0, 4.0, 1.0])
+    phase = np.array([1.0, 0.7, 0.2, 0.2, 0.9])
+    offset, _ = made.drift(volts, volts ** 2, inputs(30.0 * np.arange(1, 6), phase=phase), WIRE)
+    held = np.array([30.0, 30.0, 30.0, 60.0, 30.0])
+    change = np.array([0.0, -0.3, -0.5, -0.5, 0.7])
+    np.testing.assert_allclose(offset, 0.001 * 0.27 * change * np.log1p(held / 2.0), atol=1e-15)
 
 
 def test_creep_that_is_kept_is_the_sum_over_all_steps():

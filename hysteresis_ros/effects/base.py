@@ -358,6 +358,10 @@ class Effect(abc.ABC):
         """Return the effect without what it would carry from one trial to the next."""
         return self
 
+    def in_settled_rows(self) -> 'Effect':
+        """Return the effect without parameters that only transients determine: they keep values."""
+        return self
+
     def guesses(self, measured: np.ndarray) -> list[dict]:
         """Return values by name that the measured response (n,) suggests to start a fit from."""
         return []

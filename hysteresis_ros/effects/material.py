@@ -18,6 +18,7 @@ from hysteresis_ros.effects.base import (
 from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.kernels.creep import fade, relax
 from hysteresis_ros.kernels.play import follow
+from hysteresis_ros.kernels.trial import LONGEST_TRANSIENT
 
 
 # Drives that make a muscle hot.
@@ -270,9 +271,7 @@ class Creep(MaterialEffect):
     experiment = 'holds of 300 s'
     confused_with = ('thermal_lag', 'ambient_drift')
     kinds = ('arm', 'bench')
-    needs_transients = True
     needs_phase = True
-    invertible = False
     parameters = (
         Parameter('c', '% of l0', 'strain per factor e of time after a full transformation', 0.01,
                   0.5, 0.0, (0.03, 0.15), log=True),
@@ -309,17 +308,18 @@ class Creep(MaterialEffect):
         """Return the strain since the last step, in that step's direction."""
         if self.kept:
             return self._relax(inputs.phase, inputs.dt, surroundings), 1.0
-        # A ramp is many small steps: what a hold after it shows is the whole ramp's.
+        # A ramp is many small steps: what a hold after it shows is the whole ramp's. Rows that are
+        # far apart are the ends of holds, each after a step of its own.
         change = drive - (surroundings.cold if self._drive is None else self._drive)
         direction = 0.0
         if abs(change) > self.HOLD * surroundings.drive_range:
             direction = math.copysign(1.0, change)
-        self._carried *= math.exp(-self.FADING * inputs.dt / self.t0)
         if direction != 0.0:
-            if direction != self._direction:
+            if direction != self._direction or inputs.dt > LONGEST_TRANSIENT:
                 self._before = self._phase
                 self._carried += self._crept
-            self._since = inputs.time
+            self._since = inputs.time - inputs.dt
+        self._carried *= math.exp(-self.FADING * inputs.dt / self.t0)
         self._direction, self._drive, self._phase = direction, drive, inputs.phase
         if self._since is None:
             return 0.0, 1.0
@@ -337,13 +337,28 @@ class Creep(MaterialEffect):
             np.abs(change) > self.HOLD * surroundings.drive_range, np.sign(change), 0.0)
         rows = np.arange(len(drive))
         last = np.maximum.accumulate(np.where(direction != 0.0, rows, -1))
-        turned = (direction != 0.0) & (direction != np.concatenate(([0.0], direction[:-1])))
+        turned = (direction != 0.0) & (
+            (direction != np.concatenate(([0.0], direction[:-1])))
+            | (inputs.dt > LONGEST_TRANSIENT))
         begun = np.maximum.accumulate(np.where(turned, rows, 0))
         before = np.concatenate(([1.0], inputs.phase))[begun]
-        held = np.where(last >= 0, inputs.time - inputs.time[last], 0.0)
+        stepped = inputs.time - inputs.dt
+        held = np.where(last >= 0, inputs.time - stepped[last], 0.0)
         strain = self._strain(inputs.phase - before, held, surroundings)
         clock = self.FADING / self.t0 * np.cumsum(inputs.dt)
         return strain + fade(strain, turned, clock), np.ones(len(drive))
+
+    def in_settled_rows(self) -> Effect:
+        """
+        Return the effect with t0 as it is.
+
+        Of equal holds all that shows is what has crept at their ends.
+        """
+        other = self.with_values()
+        other.parameters = tuple(
+            dataclasses.replace(parameter, kinds=()) if parameter.name == 't0' else parameter
+            for parameter in self.parameters)
+        return other
 
     def _times(self) -> np.ndarray:
         """Return the time constant [s] of each relaxation, (modes,)."""

@@ -49,7 +49,7 @@ def fade(strain: np.ndarray, turned: np.ndarray, clock: np.ndarray) -> np.ndarra
     strain : ndarray, shape (rows,)
         Strain of the present run.
     turned : ndarray of bool, shape (rows,)
-        Whether a run begins.
+        Whether a run begins, as soon as the row before has ended.
     clock : ndarray, shape (rows,)
         Time over the time in which it falls by a factor e.
 
@@ -62,7 +62,7 @@ def fade(strain: np.ndarray, turned: np.ndarray, clock: np.ndarray) -> np.ndarra
     carried, begun = 0.0, 0
     for n in range(len(strain)):
         if turned[n] and n > 0:
-            carried = course[n - 1] * math.exp(clock[n - 1] - clock[n]) + strain[n - 1]
-            begun = n
+            carried = course[n - 1] + strain[n - 1]
+            begun = n - 1
         course[n] = carried * math.exp(clock[begun] - clock[n])
     return course

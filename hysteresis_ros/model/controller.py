@@ -19,6 +19,7 @@ from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.length_inverse import LengthInverse, Outcome, PHASE_PASSES
 from hysteresis_ros.model.pacing import Pacing
 from hysteresis_ros.model.targets import Targets
+from hysteresis_ros.model.trials import HOLD
 
 if TYPE_CHECKING:
     from hysteresis_ros.model.muscle import MuscleModel
@@ -192,6 +193,9 @@ class Controller:
         self._fresh = True
         self._ambient: float | None = None
         self._supply: float | None = None
+        # Time of the last setpoint, where it was given, and that since heating and cooling [s].
+        self._time: float | None = None
+        self._clock = 0.0
 
     def save(self) -> dict[str, Any]:
         """Return the memory as plain types, fit for JSON and YAML."""
@@ -203,7 +207,7 @@ class Controller:
                 'targets': self._targets.save() if self.model.geometry is not None else {},
                 'pacing': self._pacing.save(),
                 'fresh': self._fresh, 'arm': self._arm, 'ambient': self._ambient,
-                'supply': self._supply}
+                'supply': self._supply, 'time': self._time, 'clock': self._clock}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """
@@ -216,7 +220,7 @@ class Controller:
         """
         before = self.save()
         try:
-            for name in ('ambient', 'supply'):
+            for name in ('ambient', 'supply', 'time', 'clock'):
                 value = state.get(name)
                 if value is not None and not math.isfinite(value):
                     raise ValueError(f'{name} is {value}')
@@ -238,6 +242,7 @@ class Controller:
         self._pacing.restore(**state['pacing'])
         self._fresh, self._arm = bool(state['fresh']), bool(state['arm'])
         self._ambient, self._supply = state['ambient'], state.get('supply')
+        self._time, self._clock = state.get('time'), float(state.get('clock') or 0.0)
 
     def reference(self, theta: float) -> Reference:
         """
@@ -371,8 +376,10 @@ class Controller:
             self._length.second.settle_cold(
                 self._cold, force, self._at_rest()[1] if self._arm else None)
             self._pacing.rest(float(self.model.martensite(self._length.second.output)))
-        drive, saturated, outcome, inputs = self._length.find(length, force, self._inputs(
-            0.0, self._length.share(length, force), ambient, supply), self.dead_band)
+        inputs = self._inputs(
+            self._since_setpoint(time), self._length.share(length, force), ambient, supply)
+        drive, saturated, outcome, inputs = self._length.find(
+            length, force, inputs._replace(time=self._clock), self.dead_band)
         if saturated:
             outcome, inputs = self._at_limit(drive, force, inputs)
         # At the ends of the drive a plateau, or rounding, may give just what was asked for.
@@ -385,6 +392,16 @@ class Controller:
             reason = (f'length {1e3 * length:.3f} mm under {force:.3f} N is out of reach within '
                       f'{limits} {self.model.drive}; expected {1e3 * outcome.length:.3f} mm')
         return Setpoint(applied, saturated, outcome.length, outcome.length - length, reason)
+
+    def _since_setpoint(self, time: float | None) -> float:
+        """Return the time [s] since the setpoint before; where it is not known, that of a hold."""
+        since = HOLD
+        if time is not None and math.isfinite(time):
+            before = time if self._time is None else self._time
+            since = max(time - before, 0.0)
+            self._time = before + since
+        self._clock += since
+        return since
 
     def _at_limit(self, drive: float, force: float, inputs: Inputs) -> tuple[Outcome, Inputs]:
         """Say what a drive does that does not lead to the reference, under the load that it has."""

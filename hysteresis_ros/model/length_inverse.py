@@ -10,7 +10,7 @@ from typing import NamedTuple, TYPE_CHECKING
 
 import numpy as np
 
-from hysteresis_ros.effects import Inputs
+from hysteresis_ros.effects import Inputs, needs_phase
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
 from hysteresis_ros.model.pacing import Pacing
@@ -72,6 +72,7 @@ class LengthInverse:
         self._model, self._chain, self._steady = model, chain, steady
         self._first, self._pacing = first, pacing
         self._limits, self._clip = limits, clip
+        self._heat_needs_phase = needs_phase([*steady.electrical, *steady.thermal])
         self.second = SecondStage(
             model.require_length_stage(chain), model.sign, chain, first.loaded)
 
@@ -111,6 +112,8 @@ class LengthInverse:
                 if abs(outcome.phase - inputs.phase) <= SAME_SHARE:
                     break
                 inputs = inputs._replace(phase=outcome.phase)
+                if not self._heat_needs_phase:
+                    break
                 drive, saturated = find(length, force, inputs, dead_band)
                 outcome = self.outcome(drive, force, inputs)
         return drive, saturated, outcome, inputs
@@ -162,16 +165,18 @@ class LengthInverse:
         """Say what a drive would do; commits nothing."""
         drive_squared = self._steady.step(drive, inputs)
         output, committed = self.second.respond(self._first.peek(drive_squared), force)
+        phase = (float(self._model.martensite(self.second.given(output, force)))
+                 if self._chain.needs_phase else math.nan)
         offset, factor = 0.0, 1.0
         if self._steady.drifts:
             before = self._steady.save()
-            offset, factor = self._steady.advance(drive, drive_squared, self.worn(inputs, drive))
+            # What the transformation leads to is that of this drive, not of the guess before it.
+            offset, factor = self._steady.advance(
+                drive, drive_squared, self.worn(inputs, drive)._replace(phase=phase))
             self._steady.restore(before)
         base, felt = self.second.base, np.float64(force)
         length = (base + float(self._chain.scale(felt)) * factor * (output - base)
                   + float(self._chain.stretch(felt)) + offset)
-        phase = (float(self._model.martensite(self.second.given(output, force)))
-                 if self._chain.needs_phase else math.nan)
         return Outcome(length, drive_squared, committed, phase)
 
     def worn(self, inputs: Inputs, drive: float) -> Inputs:
