@@ -10,6 +10,7 @@ the answer, `bench_selection` says.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+import itertools
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
@@ -104,7 +105,29 @@ class BenchSearch:
             # On the coarse grid a loop's width hides what an effect of the load does.
             found += [fit for fit in fitted if _but_one_universal(fit)
                       or fit in generation and all_help(fit, errors)]
-        return found
+        return found + self._with_universal(found, single)
+
+    def _with_universal(self, found: Sequence[Fit], single: Mapping[str, Effect]) -> list[Fit]:
+        """
+        Return what every loaded muscle has with two effects that only some have, fitted.
+
+        Both may show only together, and what a load does only with both. Sought where two explain
+        more of the rows fitted than one does with whatever a load does.
+        """
+        order = sorted(found, key=self._fitted_error)
+        two = [fit for fit in order if len(fit.effects) == _not_universal(fit) == 2]
+        if not two or _not_universal(order[0]) < 2:
+            return []
+        known = {frozenset(fit.names) for fit in found}
+        universal = [effect for effect in single.values() if effect.universal]
+        sets = [[*two[0].effects, *some] for count in range(1, self._most - 1)
+                for some in itertools.combinations(universal, count)]
+        begun = self._in_parallel(_begun, self._coarse, [
+            effects for effects in sets
+            if frozenset(effect.id for effect in effects) not in known and not _replaced(effects)])
+        fitted = self._in_parallel(_fitted, self._coarse, [fit.effects for fit in begun])
+        return [fit for size in range(3, self._most + 1) for fit in self._best(
+            [fit for fit in fitted if len(fit.effects) == size], GROWN)]
 
     def _best(self, fits: Sequence[Fit], count: int) -> list[Fit]:
         """Return those with the least errors of fitted rows, and those of universal effects."""
@@ -183,7 +206,12 @@ def says_more(fit: Fit) -> bool:
 
 def _but_one_universal(fit: Fit) -> bool:
     """Whether every loaded muscle has all but one of the effects of a fit."""
-    return sum(not effect.universal for effect in fit.effects) == 1
+    return _not_universal(fit) == 1
+
+
+def _not_universal(fit: Fit) -> int:
+    """Count the effects of a fit that not every loaded muscle has."""
+    return sum(not effect.universal for effect in fit.effects)
 
 
 def _replaced(effects: Sequence[Effect]) -> bool:
@@ -193,8 +221,9 @@ def _replaced(effects: Sequence[Effect]) -> bool:
 
 def _alone(fitter: BenchFitter, name: str) -> Fit | None:
     """Fit one effect."""
-    effect = present(fitter.problem.model, catalogue()[name])
-    if not fitter.problem.loads_return:
+    problem = fitter.problem
+    effect = present(problem.model, catalogue()[name], problem.settled)
+    if not problem.loads_return:
         effect = effect.within_trials()
     with np.errstate(all='ignore'):
         return _finite(fitter.search([], effect))
