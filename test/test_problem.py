@@ -37,6 +37,8 @@ def test_what_needs_transients_is_unobservable_in_settled_rows(problem):
     assert not set(names) & set(unobservable)
     few = problem_for(problem.model, problem.measurements, ['thermal_lag', 'payload_error'])
     assert observable(few) == (['payload_error'], {'thermal_lag': 'every row is settled'})
+    # What creeps shows at the ends of holds.
+    assert 'creep' in names
     moving = problem_for(problem.model, [runs(problem.model, dt=0.1)])
     assert 'thermal_lag' in observable(moving)[0]
 

@@ -232,7 +232,8 @@ class _Verdict:
 
     def _weak(self, names: Sequence[str], values: Callable[[Effect], list[Effect]]) -> list[str]:
         """Return which of some effects would not stand out at any of their values."""
-        tried = {name: values(present(self.problem.model, catalogue()[name])) for name in names}
+        tried = {name: values(present(self.problem.model, catalogue()[name], self.problem.settled))
+                 for name in names}
         changes = self.fitter.simulate(
             [[one] for some in tried.values() for one in some]) - self.sets.base.predicted
         sizes = iter(np.sqrt(np.mean(changes ** 2, axis=1)))

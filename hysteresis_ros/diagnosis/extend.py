@@ -361,7 +361,7 @@ def _on_bench(problem: BenchProblem, model: MuscleModel, classes: Sequence[type[
     found: list[Fitted] = []
     for number, kind in enumerate(classes, 1):
         known = [effect for effect in known if effect.id not in kind.replaces]
-        effect = present(model, kind)
+        effect = present(model, kind, problem.settled)
         fits = [fitter.search(known, effect)]
         if known:
             fits.append(fitter.fit(usual([*known, effect], problem.kind)))
@@ -380,7 +380,7 @@ def _on_arm(problem: ArmProblem, model: MuscleModel, classes: Sequence[type[Effe
     fit = selection.sets.base
     found: list[Fitted] = []
     for number, kind in enumerate(classes, 1):
-        fit = selection.add(fit, present(model, kind))
+        fit = selection.add(fit, present(model, kind, problem.settled))
         if number == len(classes) > 1:
             fit = selection.each_anew(fit)
         best = selection.fitter.least_squares(fit)

@@ -84,7 +84,7 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
     if point is not None:
         # What the response or the residual suggests is always looked at.
         usual = {_key(start) for name in names for start in starts_of(
-            present(problem.model, catalogue()[name]), problem.kind)}
+            present(problem.model, catalogue()[name], problem.settled), problem.kind)}
         known = {_key(start.effect): start.columns for start in earlier
                  if _key(start.effect) in usual}
         kept = _promising(walks, responses - fit.predicted, problem.measured - fit.predicted,
@@ -137,9 +137,9 @@ def _started(fitter: Fitter, fit: Fit, names: Sequence[str]
     own = {effect.id: effect for effect in fitter.fixed}
     starts: list[Effect] = []
     for name in names:
-        starts += starts_of(present(problem.model, catalogue()[name]), problem.kind,
-                            problem.measured, residual=problem.measured - fit.predicted,
-                            clock=problem.own_clock)
+        starts += starts_of(present(problem.model, catalogue()[name], problem.settled),
+                            problem.kind, problem.measured,
+                            residual=problem.measured - fit.predicted, clock=problem.own_clock)
         if name in own:
             # What the bench says of it is as good a start as any.
             starts.append(own[name])

@@ -65,10 +65,11 @@ def recorded_range(problem: Problem, column: str) -> float:
     return float(np.ptp(values)) if len(values) else 0.0
 
 
-def present(model: MuscleModel, kind: type[Effect]) -> Effect:
-    """Return the model's own effect of a kind, or a neutral one."""
+def present(model: MuscleModel, kind: type[Effect], settled: bool) -> Effect:
+    """Return the model's own effect of a kind, or a neutral one, for rows that are all settled."""
     own = [effect for effect in model.effects if effect.id == kind.id]
-    return own[0] if own else kind(model.surroundings)
+    effect = own[0] if own else kind(model.surroundings)
+    return effect.in_settled_rows() if settled else effect
 
 
 def may_differ(problem: Problem, effect: Effect) -> bool:

@@ -463,7 +463,7 @@ class Session:
 
     def _best_start(self, name: str) -> Effect:
         kind = effect_class(name)
-        own = present(self.model, kind)
+        own = present(self.model, kind, self._problem.settled)
         starts = starts_of(own, self._problem.kind, self._measured[self._fitted], STARTS)
         if any(effect.id == name for effect in self.model.effects):
             starts.append(own)
