@@ -13,6 +13,8 @@ from hysteresis_ros.effects.stages import MechanismEffect
 LEAST_ROWS, MARGIN = 3, 0.04
 # How far before the first row after the event, as a share of its time, a fit starts.
 BEFORE = 0.01
+# A time [s] at which no recording goes on any more, the last one that a fit can come to: no break.
+NEVER = 5e5
 
 
 class WireBreak(MechanismEffect):
@@ -34,7 +36,7 @@ class WireBreak(MechanismEffect):
     invertible = False
     parameters = (
         # From the first seconds of a recording to a whole day.
-        Parameter('time', 's', 'when it broke, since the recording began', 1.0, 1e5, 0.0, (1000.0,),
+        Parameter('time', 's', 'when it broke, since the recording began', 1.0, 1e5, NEVER, (1000.0,),
                   log=True),)
 
     @classmethod
@@ -45,7 +47,7 @@ class WireBreak(MechanismEffect):
     @property
     def break_time(self) -> float:  # type: ignore[override]
         """Return when a muscle breaks [s]; infinite if none does."""
-        return self.time if self.time > 0.0 else math.inf
+        return self.time if 0.0 < self.time < NEVER else math.inf
 
     def moments(self, residual: np.ndarray, clock: np.ndarray) -> list[dict[str, float]]:
         """Return the moment at which the residual changes most, in its mean and size."""
