@@ -246,6 +246,20 @@ def test_settled_rows_creep_each_from_its_own_step():
     np.testing.assert_allclose(offset, 0.001 * 0.27 * change * np.log1p(held / 2.0), atol=1e-15)
 
 
+def test_creep_may_be_as_large_after_a_small_step():
+    volts = np.array([2.0, 3.0, 4.0])
+    trial = inputs(30.0 * np.arange(1, 4), phase=np.array([0.9, 0.8, 0.0]))
+    in_proportion, even = (effect('creep', c=0.1, t0=2.0, s=s).drift(
+        volts, volts ** 2, trial, WIRE)[0] for s in (0.0, 0.1))
+    assert in_proportion[0] == pytest.approx(in_proportion[2] / 8.0)
+    assert even[0] == pytest.approx(math.tanh(1.0) * even[2], rel=1e-4)
+    # A full transformation creeps alike.
+    one = inputs([30.0], phase=np.array([0.0]))
+    for s in (0.0, 0.1):
+        crept, _ = effect('creep', c=0.1, t0=2.0, s=s).drift(volts[:1], volts[:1] ** 2, one, WIRE)
+        assert crept[0] == pytest.approx(-0.001 * 0.27 * math.log1p(15.0))
+
+
 def test_creep_that_is_kept_is_the_sum_over_all_steps():
     made = effect('creep', c=0.1, t0=2.0, kept=1.0)
     time = 0.5 * np.arange(1, 801)

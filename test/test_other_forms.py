@@ -67,6 +67,25 @@ def test_creep_by_another_law_is_creep(monkeypatch, form):
     assert found.rmse_after < 0.5 * found.rmse_before
 
 
+@pytest.mark.parametrize('protocol', [
+    'arm-steps', pytest.param('arm-dynamic', marks=pytest.mark.long)])
+def test_creep_that_is_as_large_after_a_small_step_is_creep(monkeypatch, protocol):
+    """Of 0.3 percent of the length in a hold of 30 s, however much has transformed."""
+    creep_on = ParallelWires._creep_on
+
+    def otherwise(self, voltage, dt):
+        creep_on(self, voltage, dt)
+        length = self._conditions.material.resting_length
+        self._creep = (0.0012 * length * math.tanh((self._share - self._run_share) / 0.09)
+                       * math.log1p(self._since / 2.0))
+    monkeypatch.setattr(ParallelWires, '_creep_on', otherwise)
+    found = found_in({'creep': 1.0}, 5, protocol=protocol, trials=(0, 1))
+    assert (found.verdict, found.missing) == ('missing', ['creep'])
+    made = {effect.id: effect for effect in found.effects}
+    assert made['creep'].s > 0.0
+    assert found.rmse_after < 0.7 * found.rmse_before
+
+
 @pytest.mark.parametrize('radiated', [0.0, pytest.param(1.0, marks=pytest.mark.long)])
 def test_heat_lost_by_convection_or_radiation_alone_is_heat_loss(monkeypatch, radiated):
     monkeypatch.setattr(still_air, 'RADIATED', radiated)

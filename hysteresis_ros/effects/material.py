@@ -263,9 +263,10 @@ class Creep(MaterialEffect):
 
     id = 'creep'
     sentence = 'After a step the muscle goes on moving the same way, with the logarithm of time.'
-    equation = ('L += c l0 dxi ln(1 + t / t0), t since the last step and dxi the change of the '
-                'martensite share by it, and that of the steps before, which fades with '
-                'exp(-2 t / t0); where kept is 1, the logarithms of all steps so far')
+    equation = ('L += c l0 g(dxi) ln(1 + t / t0), t since the last step and dxi the change of the '
+                'martensite share by it, g(dxi) = dxi, or tanh(dxi / s) / tanh(1 / s); and that of '
+                'the steps before, which fades with exp(-2 t / t0); where kept is 1, the '
+                'logarithms of all steps so far')
     source = "logarithmic creep of what has just transformed; Boltzmann's superposition (kept = 1)"
     shows_in = 'log time in a hold'
     experiment = 'holds of 300 s'
@@ -279,7 +280,10 @@ class Creep(MaterialEffect):
                   log=True),
         Parameter('kept', '1', '0: a step lets the creep of those before fade, as in a '
                   'transformation; 1: it goes on, as in a polymer', 0.0, 1.0, 0.0, (0.0, 1.0),
-                  choices=(0.0, 1.0)),)
+                  choices=(0.0, 1.0)),
+        Parameter('s', '1', 'change of the martensite share by a step from which on a larger one '
+                  'creeps hardly more; 0: in proportion to it', 0.0, 0.1, 0.0, (0.0, 0.1),
+                  choices=(0.0, 0.1)))
 
     # When the last step was [s], and the drive before; None before a trial.
     _since: float | None
@@ -389,7 +393,10 @@ class Creep(MaterialEffect):
 
     def _strain(self, change: Values, held: Values, surroundings: Surroundings) -> Values:
         """Return it for a change of the phase; nothing where that is not known."""
-        strain = self.c / 100.0 * np.nan_to_num(change) * np.log1p(held / self.t0)
+        change = np.nan_to_num(change)
+        if self.s > 0.0:
+            change = np.tanh(change / self.s) / math.tanh(1.0 / self.s)
+        strain = self.c / 100.0 * change * np.log1p(held / self.t0)
         return -surroundings.sign * surroundings.length * strain
 
 

@@ -36,8 +36,8 @@ class WireBreak(MechanismEffect):
     invertible = False
     parameters = (
         # From the first seconds of a recording to a whole day.
-        Parameter('time', 's', 'when it broke, since the recording began', 1.0, 1e5, NEVER, (1000.0,),
-                  log=True),)
+        Parameter('time', 's', 'when it broke, since the recording began', 1.0, 1e5, NEVER,
+                  (1000.0,), log=True),)
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:
