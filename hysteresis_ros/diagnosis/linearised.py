@@ -142,7 +142,7 @@ def _started(fitter: Fitter, fit: Fit, names: Sequence[str]
                             residual=problem.measured - fit.predicted, clock=problem.own_clock)
         if name in own:
             # What the bench says of it is as good a start as any.
-            starts.append(own[name])
+            starts.append(own[name].in_settled_rows() if problem.settled else own[name])
     walks = [_Moves(start, fit.effects, problem.kind) for start in starts]
     return walks, fitter.simulate([walk.at for walk in walks])
 
