@@ -122,6 +122,7 @@ class BenchProblem(Problem):
         """Return the same, from whose work this one does not learn; what is known, it shares."""
         other = copy.copy(self)
         other._passive = dict(self._passive)
+        other._courses, other._excitations = dict(self._courses), dict(self._excitations)
         if self._holding_out is not None:
             other._holding_out = self._holding_out.apart()
         return other
