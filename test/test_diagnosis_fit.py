@@ -392,6 +392,17 @@ def test_what_the_bench_says_of_an_effect_is_one_of_its_starts():
     assert [start.effect.values for start in found if start.id == own.id].count(own.values) == 1
 
 
+def test_in_settled_rows_no_start_of_creep_frees_its_time():
+    """That of the bench neither."""
+    model = bicep_model(['creep'])
+    fitter = fitter_of(model, noisy(model))
+    base = Fit([], np.zeros(0), fitter.simulate([[]])[0], np.zeros((len(
+        fitter.problem.measured), 0)))
+    found = linearised_starts(fitter, base, ['creep'])
+    assert [start.effect.values for start in found].count(model.effects[0].values) >= 1
+    assert all(start.columns.shape[1] == 1 for start in found)
+
+
 @pytest.mark.parametrize('name', ['end_stop', 'overload', 'encoder_eccentricity', 'heat_loss'])
 def test_of_many_starts_the_best_is_linearised_with_other_effects(name):
     """With the derivatives that they had alone that has the best evidence which does with its."""

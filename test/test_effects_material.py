@@ -244,6 +244,10 @@ def test_settled_rows_creep_each_from_its_own_step():
     held = np.array([30.0, 30.0, 30.0, 60.0, 30.0])
     change = np.array([0.0, -0.3, -0.5, -0.5, 0.7])
     np.testing.assert_allclose(offset, 0.001 * 0.27 * change * np.log1p(held / 2.0), atol=1e-15)
+    made.start()
+    for n, volt in enumerate(volts.tolist()):
+        row = Inputs(30.0 * (n + 1), 30.0 * (n + 1), 30.0, math.nan, float(phase[n]), 0.0)
+        assert made.advance(volt, volt ** 2, row, WIRE)[0] == pytest.approx(offset[n], abs=1e-15)
 
 
 def test_creep_may_be_as_large_after_a_small_step():

@@ -321,6 +321,14 @@ class Effect(abc.ABC):
         other._begin(self.values, values)
         return other
 
+    def with_parameter(self, name: str, **changes: Any) -> 'Effect':
+        """Return a copy, one of whose parameters is described otherwise."""
+        other = self.with_values()
+        other.parameters = tuple(
+            dataclasses.replace(parameter, **changes) if parameter.name == name else parameter
+            for parameter in self.parameters)
+        return other
+
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
         """
         Name the parameters outside their physical range, if in use.

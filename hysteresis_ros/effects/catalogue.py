@@ -7,7 +7,7 @@ import inspect
 from importlib import metadata
 
 from hysteresis_ros.effects import (
-    ambient, cable_friction, cold_clamps, electrical, encoder_eccentricity, formation_memory,
+    ambient, cable_friction, cold_clamps, creep, electrical, encoder_eccentricity, formation_memory,
     heat_loss, material, measured_supply, mechanism, overload, phase_modulus, sensor,
     thermal, transformation_slopes, valve_lag, viscoelastic_creep, wire_break)
 from hysteresis_ros.effects.base import Effect, STAGES
@@ -26,9 +26,9 @@ DESCRIPTION = ('id', 'stage', 'sentence', 'equation', 'source', 'shows_in', 'exp
 def _own() -> list[type[Effect]]:
     found = []
     for module in (electrical, measured_supply, thermal, heat_loss, valve_lag, ambient, material,
-                   viscoelastic_creep, transformation_slopes, phase_modulus, formation_memory,
-                   overload, cold_clamps, mechanism, cable_friction, wire_break, sensor,
-                   encoder_eccentricity):
+                   creep, viscoelastic_creep, transformation_slopes, phase_modulus,
+                   formation_memory, overload, cold_clamps, mechanism, cable_friction, wire_break,
+                   sensor, encoder_eccentricity):
         found += [member for member in vars(module).values()
                   if inspect.isclass(member) and issubclass(member, Effect)
                   and member.__module__ == module.__name__ and 'id' in vars(member)]
