@@ -212,18 +212,16 @@ def test_two_degrees_of_white_noise_on_the_models_own_response_are_adequate(mode
     """
     The noise is estimated from the data; unknown is what has structure.
 
-    Noise of one recording may look like that; none of it has a name.
+    Of a recording it is known to a few percent, which is more than the model's own error.
     """
     train, _ = recordings({})
-    verdicts = []
     for seed in range(100, 103):
         noise = math.radians(2.0) * np.random.default_rng(seed).standard_normal(train.rows)
         found = diagnose(model, [with_noise(of_the_model(model, train), noise)], seed=SEED)
         assert found.missing == [] and found.unexplained < 0.2
         assert found.noise_floor == pytest.approx(math.radians(2.0), rel=0.15)
-        verdicts.append(found.verdict)
+        assert found.verdict == 'adequate'
         check_json(found)
-    assert verdicts.count('adequate') >= 2
 
 
 @pytest.mark.parametrize('seed', range(3))

@@ -125,3 +125,25 @@ def test_noise_is_judged_by_the_same_draws_whatever_else_was_judged(fitter):
             found = sets._noise_p_value(names)
         p_values.append(found)
     assert p_values[0] == p_values[1]
+
+
+@pytest.mark.parametrize('wave, at_least, at_most', [(0.0, 19, 20), (0.035, 0, 1)])
+def test_what_may_be_noise_is_not_held_against_the_model(
+        fitter, sets, monkeypatch, wave, at_least, at_most):
+    """
+    Two degrees of white noise are known to a few percent: of 20 recordings 19 have nothing else.
+
+    As much that lasts from row to row is seen.
+    """
+    sets.rmse_95, sufficient = 0.008, 0
+    base, rng = fitted(fitter, 0), np.random.default_rng(6)
+    row = np.arange(len(base.predicted))
+    for _ in range(20):
+        residual = 0.035 * rng.standard_normal(len(row)) + wave * np.sin(row / 4.0)
+        monkeypatch.setattr(fitter.problem, 'measured', base.predicted + residual)
+        values = fitter.covariance.fit(residual)
+        fit = dataclasses.replace(base, values=values, predicted=base.predicted.copy())
+        sets.fits[frozenset()] = fit
+        sets.keep_least(frozenset(), fit.predicted)
+        sufficient += sets.sufficient(frozenset())
+    assert at_least <= sufficient <= at_most

@@ -37,6 +37,8 @@ TIME_SPREAD = 1.5
 # Largest scale of the discrepancy (natural logarithm): two standard deviations of its prior. What
 # goes beyond is no error that the bench has seen.
 LARGEST_SCALE = 0.6
+# Standard deviations that a Gaussian stays below at 95 %.
+ONE_SIDED = 1.645
 # Steps of a fit, at most, and the gain in log density that is not worth one.
 EVALUATIONS, SMALL_GAIN = 25, 0.01
 # Degrees of freedom of whitened residuals: those of clean arms of three constitutive models have a
@@ -284,6 +286,31 @@ class Covariance:
         with np.errstate(all='ignore'):
             found = [self._least_cost(start, residual, matrix) for start in starts]
         return min(found, key=lambda one: one[0])[1]
+
+    def noise_at_most(self, values: np.ndarray, residual: np.ndarray) -> float:
+        """
+        Return the standard deviation that white noise stays below at about 95 %.
+
+        Of few rows it is known to a few percent only, which of much noise is more than the base
+        model's own error. By a Gaussian about the values found, that is as wide as their average
+        information says.
+
+        Parameters
+        ----------
+        values : ndarray, shape (4,)
+            As `fit` found them.
+        residual : ndarray, shape (n,)
+            Measured less simulated.
+
+        Returns
+        -------
+        float
+            In the unit of the response.
+        """
+        with np.errstate(all='ignore'):
+            information = self._cost(values, residual, self.discrepancy.matrix())[2]
+        further = ONE_SIDED * math.sqrt(max(linalg.pinvh(information)[3, 3], 0.0))
+        return float(np.exp(min(values[3] + further, self._high[3])))
 
     def _least_cost(self, values: np.ndarray, residual: np.ndarray, matrix: np.ndarray
                     ) -> tuple[float, np.ndarray]:

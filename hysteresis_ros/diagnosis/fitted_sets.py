@@ -25,6 +25,8 @@ SIGNIFICANCE = 0.05
 # The same for noise that is not as large at all times: so many noisy recordings are called unknown
 # by chance.
 NOISE_SIGNIFICANCE = 0.01
+# So many times the noise is more than the rows of a recording could mean by it.
+MUCH_MORE = 2.0
 # Of what a set explains in the rows fitted it has to explain this share in rows held out: with less
 # it fails in more of that than it predicts.
 PREDICTED = 0.5
@@ -71,6 +73,7 @@ class FittedSets:
         self._least: dict[frozenset[str], np.ndarray] = {}
         # Each with the response that it belongs to.
         self._errors: dict[frozenset[str], tuple[np.ndarray, float, float]] = {}
+        self._largest_noises: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self._predicts: dict[frozenset[str], tuple[np.ndarray, bool]] = {}
         # The same draws for all, or chance would decide between two sets.
@@ -171,10 +174,25 @@ class FittedSets:
         Return the root mean square of a set's residual without white noise, as `own_error`.
 
         What is larger than the base model's own error could be, and not as large at all times, is
-        no noise: it has a cause.
+        no noise: it has a cause. Where it depends on how much is noise whether the base model
+        suffices, it is the most that it may be at 95 %.
         """
+        square = self.own_error(names) ** 2
         noise = 0.0 if self.uneven(names) else self.fits[names].noise
-        return math.sqrt(max(self.own_error(names) ** 2 - noise ** 2, 0.0))
+        beyond = square - self.rmse_95 ** 2
+        if noise ** 2 < beyond < (MUCH_MORE * noise) ** 2:
+            noise = self._noise_at_most(names)
+        return math.sqrt(max(square - noise ** 2, 0.0))
+
+    def _noise_at_most(self, names: frozenset[str]) -> float:
+        """Return the white noise of a set's residual that it stays below at 95 %."""
+        fit = self.fits[names]
+        known = self._largest_noises.get(names)
+        if known is None or known[0] is not fit.predicted:
+            noise = (fit.covariance or self.covariance).noise_at_most(
+                fit.require_values(), self.problem.measured - fit.predicted)
+            self._largest_noises[names] = known = (fit.predicted, noise)
+        return known[1]
 
     def uneven(self, names: frozenset[str]) -> bool:
         """Whether a set's residual looks like noise, but has a cause: see `noise_free_rmse`."""
