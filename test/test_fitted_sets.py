@@ -76,10 +76,10 @@ def test_what_martensite_keeps_is_no_part_of_the_models_own_error(fitter, sets, 
 
 
 def test_what_martensite_keeps_does_not_raise_what_the_model_may_be_off_by(fitter, monkeypatch):
-    without = FittedSets(fitter, Settings(), np.random.default_rng(0)).rmse_95
+    without = FittedSets(fitter, Settings(), np.random.default_rng(0)).largest_rmse
     monkeypatch.setattr(fitter.covariance, 'discrepancy', dataclasses.replace(
         fitter.covariance.discrepancy, kept=np.ones(len(fitter.problem.measured))))
-    assert FittedSets(fitter, Settings(), np.random.default_rng(0)).rmse_95 == without
+    assert FittedSets(fitter, Settings(), np.random.default_rng(0)).largest_rmse == without
 
 
 def test_fits_are_judged_anew_with_each_covariance_that_is_added(fitter, sets):
@@ -135,7 +135,7 @@ def test_what_may_be_noise_is_not_held_against_the_model(
 
     As much that lasts from row to row is seen.
     """
-    sets.rmse_95, sufficient = 0.008, 0
+    sets.largest_rmse, sufficient = 0.008, 0
     base, rng = fitted(fitter, 0), np.random.default_rng(6)
     row = np.arange(len(base.predicted))
     for _ in range(20):

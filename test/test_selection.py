@@ -123,7 +123,7 @@ def test_all_starts_are_tried_where_nothing_suffices(model, monkeypatch, change,
     sizes = []
     monkeypatch.setattr(Selection, '_fit_from_all_starts', lambda _, size: sizes.append(size))
     measured = recording(model, [effect_of(model, 'payload_error', dm=15.0)])
-    shape = np.sin(7.0 * np.arange(measured.rows) ** 1.5)
+    shape = np.sin(0.25 * np.arange(measured.rows))
     angle = measured.column('angle') + change * shape
     selection(model, Measurement.from_columns({**measured.columns, 'angle': angle}))
     assert sizes == tried
@@ -142,7 +142,8 @@ def test_what_suffices_alone_grows_alone(payload, monkeypatch):
     assert payload._worth_growing(2) == [pair]
     monkeypatch.setattr(payload, '_promising', lambda names: False)
     assert payload._worth_growing(2) == []
-    monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: 2.0 * payload.sets.rmse_95)
+    monkeypatch.setattr(payload.sets, 'noise_free_rmse',
+                        lambda names: 2.0 * payload.sets.largest_rmse)
     assert payload._worth_growing(2) == payload.sets.best_of(2)
 
 
@@ -151,7 +152,7 @@ def test_all_single_effects_grow_where_one_more_has_room(payload, monkeypatch, l
     """Besides what the base model is off by in half of all cases, whatever seems promising."""
     monkeypatch.setattr(payload, '_promising', lambda names: False)
     room = left * math.hypot(payload.covariance.size, payload.sets.rmse_50)
-    assert room < payload.sets.rmse_95
+    assert room < payload.sets.largest_rmse
     monkeypatch.setattr(payload.sets, 'own_error', lambda names: room)
     monkeypatch.setattr(payload.sets, 'noise_free_rmse', lambda names: room)
     monkeypatch.setattr(payload.sets, 'valid', lambda: [frozenset(['payload_error'])])

@@ -185,7 +185,7 @@ class _Verdict:
 
     def _unexplained(self, chosen: frozenset[str]) -> float:
         """Share of the first mean square that neither set nor base model nor noise explains."""
-        beyond = self.sets.noise_free_rmse(chosen) ** 2 - self.sets.rmse_95 ** 2
+        beyond = self.sets.noise_free_rmse(chosen) ** 2 - self.sets.largest_rmse ** 2
         first = self.sets.own_error(frozenset()) ** 2
         return float(np.clip(beyond / max(first, 1e-300), 0.0, 1.0))
 
@@ -238,7 +238,7 @@ class _Verdict:
             [[one] for some in tried.values() for one in some]) - self.sets.base.predicted
         sizes = iter(np.sqrt(np.mean(changes ** 2, axis=1)))
         # What cannot be simulated may show.
-        shows = {name: any(not size < LEAST_CHANGE * self.sets.rmse_95
+        shows = {name: any(not size < LEAST_CHANGE * self.sets.largest_rmse
                            for size in [next(sizes) for _ in some])
                  for name, some in tried.items()}
         return [name for name in names if not shows[name]]

@@ -171,7 +171,7 @@ class Selection:
         """
         valid = self.sets.valid()
         best = next(filter(self.sets.sufficient, valid), valid[0] if valid else None)
-        if best is None or self.sets.noise_free_rmse(best) > self.sets.rmse_95 or (
+        if best is None or self.sets.noise_free_rmse(best) > self.sets.largest_rmse or (
                 best and best != self.sets.ranked()[0]):
             return self.sets.best_of(size)
         # What a further effect explains has to exceed the base model's own error.
