@@ -48,6 +48,7 @@ def test_what_was_left_out_does_not_come_back(selection, monkeypatch):
     better = [dataclasses.replace(fit, held_out=0.5 * (
         base.held_out + selection.problem.measured)) for fit in selection.sets]
     selection.sets = better
+    monkeypatch.setattr(selection, 'found', better[1])
     assert selection._best_without('r_phase') is better[0]
     # Nor is a set an answer whose sizes the rows do not determine.
     undetermined.append(better[0].names)
@@ -94,6 +95,43 @@ def test_a_load_predicted_nearly_as_well_is_no_argument_against_an_effect(select
     for share, named in ((1.03, 1.0), (1.4, 0.0)):
         monkeypatch.setattr(selection, 'found', of_share(selection, ('slack',), share, 1.0))
         assert selection._named_again(selection.base) == named
+
+
+def test_what_only_some_muscles_have_is_no_rival_of_what_every_loaded_one_has(
+        selection, monkeypatch):
+    """
+    One rare effect would stand for two usual ones, as it is one, or predict one load better.
+
+    A rare one has rare ones as rivals, and usual ones.
+    """
+    usual, rare, other = (of_share(selection, *one) for one in (
+        (('stress_dependence', 'stress_dependent_strain'), 0.5, 0.5), (('r_phase',), 0.49, 0.5),
+        (('fatigue',), 0.6, 0.6)))
+    monkeypatch.setattr(selection, '_determines', lambda fit: True)
+    monkeypatch.setattr(selection, 'sets', [usual, rare, other])
+    assert selection._most_probable(selection.sets) is usual
+    monkeypatch.setattr(selection, 'found', usual)
+    assert selection._best_without('stress_dependence') is selection.base
+    monkeypatch.setattr(selection, 'found', rare)
+    assert selection._best_without('r_phase') is usual
+    selection.sets = [rare, other]
+    assert selection._best_without('r_phase') is other
+
+
+def test_sets_are_tried_in_the_simplest_forms_of_their_equations(selection):
+    """A form that fitted rows prefer may make a load that is left out hopeless."""
+    search, kinds = selection._search, catalogue()
+    surroundings = selection.problem.model.surroundings
+    shift = kinds['stress_dependence'](surroundings, C=0.8, follows=0.5)
+    growth = kinds['stress_dependent_strain'](surroundings, r=0.3, F0=0.5)
+    fit = search.fitter.fit([shift, growth])
+    assert fit.effects[0].follows > 0.0
+    simple, = search._in_simplest_forms([fit])
+    assert [effect.id for effect in simple.effects] == ['stress_dependence',
+                                                        'stress_dependent_strain']
+    assert simple.effects[0].follows == 0.0 and len(simple.vector) < len(fit.vector)
+    # One effect by itself has no form to speak of, and what is simple is known already.
+    assert search._in_simplest_forms([simple, search.fitter.fit([shift])]) == []
 
 
 def test_every_load_counts_alike_whatever_its_error(selection):

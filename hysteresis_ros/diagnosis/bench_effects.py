@@ -13,8 +13,11 @@ import numpy as np
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
-from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.bench_selection import SMALL_ERROR
+from hysteresis_ros.diagnosis.between_loads import best_between_loads
 from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.discrepancy import FEWEST_LOADS
 from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import located
@@ -159,6 +162,11 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], problem: BenchP
                  'bench')
     if not rest:
         return list(found)
+    practical = Settings().practical
+    if not found and len(np.unique(problem.left_out_together)) >= FEWEST_LOADS:
+        small = max(problem.noise, SMALL_ERROR * float(np.ptp(problem.measured)))
+        between = best_between_loads(fitter, rest, small, practical)
+        return _with_universal(model, between, problem, excluded) if between else []
 
     def held_out(fit: Fit) -> float:
         return fitter.error(fitter.cross_validate(fit).held_out)
@@ -167,7 +175,6 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], problem: BenchP
         return [one for one in effects if one.universal and not_determined(one, 'bench')]
 
     # Alone they have to help; together with one that was found they only must not harm.
-    practical = Settings().practical
     largest = held_out(fitter.fit(found)) * ((1.0 + practical) if names else (1.0 - practical))
 
     def tried(effects: Sequence[Effect]) -> tuple[float, list[Effect]]:

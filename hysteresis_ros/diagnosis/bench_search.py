@@ -17,7 +17,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
-from hysteresis_ros.diagnosis.forms import other_forms
+from hysteresis_ros.diagnosis.forms import other_forms, simplest_forms
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.effects import catalogue, Effect
@@ -67,11 +67,12 @@ class BenchSearch:
         fits : list of Fit
             All single effects, and larger sets.
         variants : list of Fit
-            The best of each size again, in other forms of its effects' equations.
+            The best of each size again, in other forms of its effects' equations, and sets in the
+            simplest ones.
         """
         fits = self._begun_where_larger_ended(
             self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
-        return fits, self._in_other_forms(fits)
+        return fits, [*self._in_other_forms(fits), *self._in_simplest_forms(fits)]
 
     def cross_validated(self, fits: Sequence[Fit]) -> list[Fit]:
         """Return fits with their held-out rows, without those that predict none."""
@@ -115,8 +116,8 @@ class BenchSearch:
         more of the rows fitted than one does with whatever a load does.
         """
         order = sorted(found, key=self._fitted_error)
-        two = [fit for fit in order if len(fit.effects) == _not_universal(fit) == 2]
-        if not two or _not_universal(order[0]) < 2:
+        two = [fit for fit in order if len(fit.effects) == not_universal(fit) == 2]
+        if not two or not_universal(order[0]) < 2:
             return []
         known = {frozenset(fit.names) for fit in found}
         universal = [effect for effect in single.values() if effect.universal]
@@ -171,6 +172,20 @@ class BenchSearch:
              if effect.id in forms else effect for effect in fit.effects]
             for fit in best.values() for forms in other_forms(fit.effects)])
 
+    def _in_simplest_forms(self, fits: Sequence[Fit]) -> list[Fit]:
+        """
+        Return fits of several effects in the simplest forms of their equations.
+
+        A form that fitted rows prefer by little can make loads that are left out hopeless.
+        """
+        sets = []
+        for fit in fits:
+            forms = simplest_forms(fit.effects)
+            if forms and len(fit.effects) > 1:
+                sets.append([effect.with_values(**forms.get(effect.id, {}))
+                             for effect in fit.effects])
+        return self._in_parallel(_fitted, self.fitter, sets)
+
     def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None], fitter: BenchFitter,
                      items: Sequence) -> list[Fit]:
         results: Iterable[Fit | None]
@@ -204,14 +219,14 @@ def says_more(fit: Fit) -> bool:
     return not fit.implausible() and not any(map(_vanished, fit.effects))
 
 
-def _but_one_universal(fit: Fit) -> bool:
-    """Whether every loaded muscle has all but one of the effects of a fit."""
-    return _not_universal(fit) == 1
-
-
-def _not_universal(fit: Fit) -> int:
+def not_universal(fit: Fit) -> int:
     """Count the effects of a fit that not every loaded muscle has."""
     return sum(not effect.universal for effect in fit.effects)
+
+
+def _but_one_universal(fit: Fit) -> bool:
+    """Whether every loaded muscle has all but one of the effects of a fit."""
+    return not_universal(fit) == 1
 
 
 def _replaced(effects: Sequence[Effect]) -> bool:

@@ -20,7 +20,8 @@ import numpy as np
 from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
-from hysteresis_ros.diagnosis.bench_search import all_help, BenchSearch, says_more
+from hysteresis_ros.diagnosis.bench_search import (
+    all_help, BenchSearch, not_universal, says_more)
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.effects import catalogue
@@ -228,10 +229,12 @@ class BenchSelection:
         Return the best set that lacks an effect, and those that were left out before.
 
         It could be an answer itself: the rows determine all of its effects. Else of two effects
-        that stand for each other neither would be left.
+        that stand for each other neither would be left. And it has no more effects that only some
+        muscles have, which are no reason to leave out what every loaded one has.
         """
         without = [fit for fit in self.sets
-                   if not {name, *self.unstable}.intersection(fit.names)]
+                   if not {name, *self.unstable}.intersection(fit.names)
+                   and not_universal(fit) <= not_universal(self.found)]
         return next((fit for fit in sorted(without, key=self.typical_error)
                      if self.typical_error(fit) < self.typical_error(self.base)
                      and self._determines(fit)), self.base)
@@ -296,12 +299,13 @@ class BenchSelection:
         """
         Return the log posterior odds of a fit against another one by the rows that both fit.
 
-        By Schwarz's criterion, with as many independent rows as there are blocks.
+        By Schwarz's criterion, with as many independent rows as there are blocks. What every loaded
+        muscle has is not improbable beforehand, or a rare effect would stand for two of it.
         """
         count = len(np.unique(self.problem.block))
         prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
         before, after = (self._typical(one.predicted, self.problem.noise) for one in (base, fit))
-        return (prior * (len(fit.effects) - len(base.effects)) + significance.schwarz_log_odds(
+        return (prior * (not_universal(fit) - not_universal(base)) + significance.schwarz_log_odds(
             before, after, count, self._parameters(fit) - self._parameters(base)))
 
     def _parameters(self, fit: Fit) -> int:

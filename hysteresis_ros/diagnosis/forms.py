@@ -41,7 +41,7 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
         In the same order: the effects given, or fitted anew with other forms.
     """
     free = [effect for effect in effects if effect.id not in fixed]
-    simplest, others = _simplest(free), other_forms(free)
+    simplest, others = simplest_forms(free), other_forms(free)
     if not simplest and not others:
         return list(effects)
     trial = BenchFitter(fitter.problem)
@@ -71,7 +71,7 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
     return [found[effect.id] for effect in effects]
 
 
-def _simplest(effects: Sequence[Effect]) -> Forms:
+def simplest_forms(effects: Sequence[Effect]) -> Forms:
     """Return the neutral values of parameters of form that are not neutral."""
     found = {effect.id: {parameter.name: parameter.neutral for parameter in effect.parameters
                          if parameter.form and effect.values[parameter.name] != parameter.neutral}
