@@ -577,6 +577,16 @@ def test_identify_says_what_effects_auto_does(bench, tmp_path, capsys, monkeypat
                                      'auto', '-o', f'{tmp_path}/m.yaml'], capsys)
 
 
+@pytest.mark.parametrize('effects, said', [('auto', True), ('none', False)])
+def test_identify_says_that_nothing_was_found(bench, tmp_path, capsys, monkeypatch, effects, said):
+    """A bench of which no effect is named has been looked at, too."""
+    monkeypatch.setattr('hysteresis_ros.diagnosis.bench_effects.add_effects',
+                        lambda model, *args, **options: (model, []))
+    assert main(['identify', '--length', f'{bench}/length.csv', '--force', f'{bench}/force.csv',
+                 '--effects', effects, '-o', f'{tmp_path}/m.yaml']) == 0
+    assert ('No effect: with none are trials' in capsys.readouterr().out) is said
+
+
 @pytest.mark.parametrize('name, operator, kind, better', [
     # A plain Preisach operator does not see the load, the linear model does.
     ('sma_react/nitihf_isobaric.csv', 'preisach', 'preisach', 3.0),

@@ -43,6 +43,17 @@ def test_what_needs_transients_is_unobservable_in_settled_rows(problem):
     assert 'thermal_lag' in observable(moving)[0]
 
 
+def test_what_only_a_bench_shows_is_said_to_show_there(problem):
+    """But for what the model has from there, and what this muscle cannot have."""
+    _, unobservable = observable(problem)
+    assert unobservable['phase_modulus'].startswith('only a bench shows it')
+    asked = problem_for(problem.model, problem.measurements, ['phase_modulus'])
+    assert observable(asked) == ([], {'phase_modulus': unobservable['phase_modulus']})
+    known = problem_for(bicep_model(['phase_modulus']), problem.measurements)
+    assert 'phase_modulus' not in observable(known)[1]
+    assert not {'payload_error', 'series_compliance'} & set(unobservable)
+
+
 def test_the_clock_runs_on_over_trials_and_recordings():
     """An event has one time, whatever the files are divided into."""
     model = bicep_model()

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 AUTO = ('--effects auto: each effect that a bench can show is fitted to the length table, alone\n'
         'and in sets; what predicts held-out trials clearly better is kept, and what every\n'
         'loaded muscle has where it does no harm.\n')
+NOTHING = ('No effect: with none are trials that were left out predicted clearly better. What\n'
+           'each would do says `hysteresis diagnose` of the length table.')
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
@@ -84,6 +86,8 @@ def run(args: argparse.Namespace) -> None:
     steps.clear()
     found.model.save(args.output)
     say(args, report(found))
+    if args.effects == 'auto' and not found.model.effects:
+        say(args, NOTHING)
     for effect in found.model.effects:
         for note in undetermined(effect, 'bench'):
             warn(note)

@@ -29,17 +29,23 @@ def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
     -------
     list of str, dict of str to str
         Identifiers to try; identifiers of unobservable effects with the reason, last those that
-        need a column.
+        need a column, or a bench.
     """
     surroundings = problem.model.surroundings
+    own = {effect.id for effect in problem.model.effects}
     taken = {effect.id for effect in problem.model.effects if not may_differ(problem, effect)}
     names: list[str] = []
     unobservable: dict[str, str] = {}
     unrecorded: dict[str, str] = {}
+    elsewhere: dict[str, str] = {}
     for name, effect in catalogue().items():
-        if name in taken or problem.kind not in effect.kinds:
+        if name in taken:
             continue
         if problem.catalogue is not None and name not in problem.catalogue:
+            continue
+        if problem.kind not in effect.kinds:
+            if 'bench' in effect.kinds and effect.available(surroundings) and name not in own:
+                elsewhere[name] = 'only a bench shows it, whose loads are held still'
             continue
         if not effect.available(surroundings):
             if problem.catalogue is not None:
@@ -54,7 +60,7 @@ def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
             unrecorded[name] = f'{column} was not recorded or did not change'
         else:
             names.append(name)
-    return names, {**unobservable, **unrecorded}
+    return names, {**unobservable, **unrecorded, **elsewhere}
 
 
 def recorded_range(problem: Problem, column: str) -> float:
