@@ -58,7 +58,7 @@ def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], small: fl
     def judged(some: Sequence[Effect]) -> tuple[float, list[Effect]]:
         own = fitter.apart()
         with np.errstate(all='ignore'):
-            fit = own.best_of([some])
+            fit = own.fit(some)
             if (not np.all(np.isfinite(fit.predicted)) or fit.implausible()
                     or _typical_error(own, fit, small) > largest_fitted):
                 return np.inf, []
