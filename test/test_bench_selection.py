@@ -118,7 +118,7 @@ def test_what_only_some_muscles_have_is_no_rival_of_what_every_loaded_one_has(
     assert selection._best_without('r_phase') is other
 
 
-def test_sets_are_tried_in_the_simplest_forms_of_their_equations(selection):
+def test_sets_are_tried_in_the_simplest_forms_of_their_equations(selection, monkeypatch):
     """A form that fitted rows prefer may make a load that is left out hopeless."""
     search, kinds = selection._search, catalogue()
     surroundings = selection.problem.model.surroundings
@@ -132,6 +132,9 @@ def test_sets_are_tried_in_the_simplest_forms_of_their_equations(selection):
     assert simple.effects[0].follows == 0.0 and len(simple.vector) < len(fit.vector)
     # One effect by itself has no form to speak of, and what is simple is known already.
     assert search._in_simplest_forms([simple, search.fitter.fit([shift])]) == []
+    monkeypatch.setattr(search, '_grown', lambda: [fit])
+    _, variants = search.run()
+    assert [one.names for one in variants if one.effects[0].follows == 0.0] == [fit.names]
 
 
 def test_every_load_counts_alike_whatever_its_error(selection):

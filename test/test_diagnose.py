@@ -7,7 +7,7 @@ import json
 import math
 
 from hidden_cases import clean_bench, TRIALS, UNIVERSAL
-from model_support import autoregressive, with_noise
+from model_support import autoregressive, effect_of, with_noise
 import numpy as np
 import pytest
 
@@ -222,6 +222,18 @@ def test_two_degrees_of_white_noise_on_the_models_own_response_are_adequate(mode
         assert found.noise_floor == pytest.approx(math.radians(2.0), rel=0.15)
         assert found.verdict == 'adequate'
         check_json(found)
+
+
+@pytest.mark.parametrize('seat', [-1.0, -0.9, 1.0])
+def test_a_play_is_one_wherever_in_it_the_encoder_was_zeroed(model, seat):
+    """A muscle that has cooled down has left it at one end; which one goes with the arm."""
+    train, _ = recordings({})
+    played = model.with_effects([*model.effects, effect_of(model, 'backlash', B=4.0, seat=seat)])
+    rng = np.random.default_rng(4)
+    found = diagnose(model, [with_noise(of_the_model(played, train), math.radians(0.1)
+                                        * rng.standard_normal(train.rows))], seed=SEED)
+    assert (found.verdict, found.missing) == ('missing', ['backlash'])
+    assert found.effects[0].seat == pytest.approx(seat, abs=0.15)
 
 
 @pytest.mark.parametrize('seed', range(3))

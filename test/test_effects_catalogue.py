@@ -121,6 +121,15 @@ def test_effect_says_what_it_is(name):
     assert effect.sentence.endswith('.') and effect.equation and effect.source
 
 
+@pytest.mark.parametrize('effect', EXPECTED)
+@pytest.mark.parametrize('muscle', [None, bicep_model(mean_load=PAPER.load).surroundings])
+def test_what_is_plausible_stays_so_where_estimates_may_be_off(effect, muscle):
+    """An end below zero lies further away by the share, too: not nearer."""
+    for parameter in catalogue()[effect](muscle).parameters:
+        for value in parameter.choices or (parameter.low, parameter.high):
+            assert parameter.plausible(value) and parameter.plausible(value, 0.15), parameter.name
+
+
 @pytest.mark.parametrize('effect, name', RANGES)
 def test_parameter_has_its_unit_and_plausible_range(effect, name):
     model = bicep_model(mean_load=PAPER.load)

@@ -110,7 +110,9 @@ class Parameter:
         if self.choices:
             return value in self.choices
         size = abs(value) if self.both_signs else value
-        return self.low / (1.0 + slack) <= size <= self.high * (1.0 + slack)
+        # An end below 0 lies further away the larger it is.
+        least = self.low * (1.0 + slack) if self.low < 0.0 else self.low / (1.0 + slack)
+        return least <= size <= self.high * (1.0 + slack)
 
 
 class Inputs(NamedTuple):
