@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 # Of several effects each has to take this share off the first error, to be seen with the others.
 LEAST_SHARE = 0.015
 SIGNIFICANCE = 0.05
-# Probability with which the base model's own error is smaller than what is called adequate. Of 144
-# clean arms of seven constitutive models one was called faulty at 95 %, as loads left out say more
+# Probability with which the base model's own error is smaller than what is called adequate. Of 122
+# clean arms of six constitutive models one was called faulty at 95 %, as loads left out say more
 # than what the model is off by; 98 % loses 4 of 218 cases of a wire that nobody here wrote, and
 # spares 3 of 4 false alarms among 64 clean recordings of a single trial.
 ADEQUATE = 0.95
