@@ -10,6 +10,7 @@ import pytest
 
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.observable import observable
+from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.measurements import Measurement
 
@@ -43,7 +44,7 @@ def test_what_needs_transients_is_unobservable_in_settled_rows(problem):
     assert 'thermal_lag' in observable(moving)[0]
 
 
-def test_what_only_a_bench_shows_is_said_to_show_there(problem):
+def test_what_only_a_bench_shows_is_said_to_show_there(problem, monkeypatch):
     """But for what the model has from there, and what this muscle cannot have."""
     _, unobservable = observable(problem)
     assert unobservable['phase_modulus'].startswith('only a bench shows it')
@@ -52,6 +53,8 @@ def test_what_only_a_bench_shows_is_said_to_show_there(problem):
     known = problem_for(bicep_model(['phase_modulus']), problem.measurements)
     assert 'phase_modulus' not in observable(known)[1]
     assert not {'payload_error', 'series_compliance'} & set(unobservable)
+    monkeypatch.setattr(catalogue()['phase_modulus'], 'available', lambda surroundings: False)
+    assert 'phase_modulus' not in observable(problem)[1]
 
 
 def test_the_clock_runs_on_over_trials_and_recordings():
