@@ -147,7 +147,7 @@ def test_every_load_counts_alike_whatever_its_error(selection):
     # What is added to each fold is taken off again, and the order of sets stays.
     assert 1e-3 < selection.typical_rmse(fit) < 8e-3
     assert selection.typical_rmse(fit) == pytest.approx(np.sqrt(
-        selection.typical_error(fit) ** 2 - selection.small_error() ** 2))
+        selection.typical_error(fit) ** 2 - selection.problem.small_error ** 2))
     same = dataclasses.replace(fit, held_out=selection.problem.measured + 2e-3)
     assert selection.typical_rmse(same) == pytest.approx(2e-3)
     # By default a hundredth of the range: differences of less do not matter.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
-from hysteresis_ros.diagnosis import bench_effects
+from hysteresis_ros.diagnosis import bench_effects, bench_problem
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.between_loads import best_between_loads
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -20,7 +20,7 @@ from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.measurements.table import Measurement
 
 SPECIMEN = 1
-SMALL, PRACTICAL = 1e-4, 0.05
+PRACTICAL = 0.05
 
 
 @pytest.fixture(scope='module')
@@ -67,15 +67,16 @@ class Blind(BenchFitter):
 
 def test_loads_at_the_ends_are_not_extrapolated_to(fitter, effects):
     """What is found is the same however badly they are predicted from the others."""
-    found = best_between_loads(fitter, effects, SMALL, PRACTICAL)
+    found = best_between_loads(fitter, effects, PRACTICAL)
     assert {'stress_dependence', 'stress_dependent_strain'} <= {one.id for one in found}
-    blind = best_between_loads(Blind(fitter.problem), effects, SMALL, PRACTICAL)
+    blind = best_between_loads(Blind(fitter.problem), effects, PRACTICAL)
     assert [one.to_dict() for one in blind] == [one.to_dict() for one in found]
 
 
-def test_what_is_found_has_to_matter(fitter, effects):
-    assert best_between_loads(fitter, effects, SMALL, 0.95) == []
-    assert best_between_loads(fitter, effects, 1.0, PRACTICAL) == []
+def test_what_is_found_has_to_matter(fitter, effects, monkeypatch):
+    assert best_between_loads(fitter, effects, 0.95) == []
+    monkeypatch.setattr(bench_problem, 'SMALL_ERROR', 1.0)
+    assert best_between_loads(fitter, effects, PRACTICAL) == []
 
 
 def test_the_rows_fitted_must_not_be_worse():
@@ -86,8 +87,7 @@ def test_the_rows_fitted_must_not_be_worse():
     polymer = identify(length, force, length_trials=range(4), force_trials=[0]).model
     fitter = BenchFitter(problem_for(polymer, [length.select(range(4))]).finer())
     effects = usual([catalogue()['stress_dependence'](polymer.surroundings)], 'bench')
-    small = 0.01 * float(np.ptp(fitter.problem.measured))
-    assert best_between_loads(fitter, effects, small, PRACTICAL) == []
+    assert best_between_loads(fitter, effects, PRACTICAL) == []
 
 
 def test_sets_have_the_simplest_forms(fitter, effects, monkeypatch):
@@ -97,7 +97,7 @@ def test_sets_have_the_simplest_forms(fitter, effects, monkeypatch):
     monkeypatch.setattr(BenchFitter, 'fit', lambda self, some, *args, **options: (
         seen.append(list(some)), fit(self, some, *args, **options))[1])
     assert any(one.values.get('follows', 0.0) > 0.0 for one in effects)
-    best_between_loads(fitter, effects, SMALL, PRACTICAL)
+    best_between_loads(fitter, effects, PRACTICAL)
     assert len(seen) == 2 ** len(effects)
     assert all(one.values.get('follows', 0.0) == 0.0 for some in seen for one in some)
 

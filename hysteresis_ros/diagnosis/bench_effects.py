@@ -13,7 +13,6 @@ import numpy as np
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
-from hysteresis_ros.diagnosis.bench_selection import SMALL_ERROR
 from hysteresis_ros.diagnosis.between_loads import best_between_loads
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.diagnose import diagnose
@@ -164,8 +163,7 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], problem: BenchP
         return list(found)
     practical = Settings().practical
     if not found and len(np.unique(problem.left_out_together)) >= FEWEST_LOADS:
-        small = max(problem.noise, SMALL_ERROR * float(np.ptp(problem.measured)))
-        between = best_between_loads(fitter, rest, small, practical)
+        between = best_between_loads(fitter, rest, practical)
         return _with_universal(model, between, problem, excluded) if between else []
 
     def held_out(fit: Fit) -> float:

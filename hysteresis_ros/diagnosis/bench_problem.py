@@ -55,6 +55,8 @@ PHASE_PASSES = 2
 WORTH = 0.02
 # How much finer than the model's the grid of H2 may be once its effects are known.
 FINER = 1.0, 1.5, 2.0
+# Share of the response's range below which an error does not matter.
+SMALL_ERROR = 0.01
 # Share of the range of the loads by which two that count as the same may differ.
 SAME_LOAD = 0.02
 # How much finer it is where sets of effects are judged: cells as wide as a loop take up what an
@@ -153,6 +155,17 @@ class BenchProblem(Problem):
         loads = self._load_of_trial
         kinds = len(np.unique(loads))
         return kinds == 1 or 1 + np.count_nonzero(np.diff(loads)) > kinds
+
+    @property
+    def small_error(self) -> float:
+        """Error below which none matters, in the unit of the response."""
+        return max(self.noise, SMALL_ERROR * float(np.ptp(self.measured)))
+
+    def squares(self, response: np.ndarray) -> np.ndarray:
+        """Return the mean square error of a response (n,) in each fold, shape (folds,)."""
+        squares, rows = (np.bincount(self.fold, weights=weights) for weights in (
+            (self.measured - response) ** 2, np.ones(len(response))))
+        return squares[rows > 0] / rows[rows > 0]
 
     @property
     def left_out_together(self) -> np.ndarray:

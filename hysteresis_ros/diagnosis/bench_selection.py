@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 SIGNIFICANCE = 0.05
 # Share of the gains and losses in all blocks that has to be gains.
 CONSISTENT = 0.55
-# Share of the response's range below which an error does not matter.
-SMALL_ERROR = 0.01
 # Share of the loads on which an effect has to be named again, at least, with that load left out.
 NAMED_AGAIN = 0.5
 
@@ -241,7 +239,7 @@ class BenchSelection:
 
     def _named_again(self, other: Fit) -> float:
         """Return the share of folds that the set found predicts no worse than another one."""
-        own, others = (np.sqrt(self._squares(fit.held_out) + self.small_error() ** 2)
+        own, others = (np.sqrt(self.problem.squares(fit.held_out) + self.problem.small_error ** 2)
                        for fit in (self.found, other))
         return float(np.mean(own <= (1.0 + self.settings.practical) * others))
 
@@ -253,11 +251,10 @@ class BenchSelection:
         """
         Return the geometric mean over the folds of the RMSE held out there, which sets go by.
 
-        Each load has errors of its own size, unknown beforehand, so that the likelihood of all is
-        that of this mean; else the least load, for which the others are extrapolated, would decide
-        alone. Differences below `least` count as none; by default below what matters.
+        Else the least load, for which the others are extrapolated, would decide alone. Differences
+        below `least` count as none; by default below what matters.
         """
-        return self._typical(fit.held_out, self.small_error() if least is None else least)
+        return self._typical(fit.held_out, self.problem.small_error if least is None else least)
 
     def typical_rmse(self, fit: Fit) -> float:
         """
@@ -265,28 +262,19 @@ class BenchSelection:
 
         It is less for one set than for another exactly where `typical_error` is.
         """
-        return float(significance.typical_rmse(self._squares(fit.held_out), self.small_error()))
+        return float(significance.typical_rmse(
+            self.problem.squares(fit.held_out), self.problem.small_error))
 
     def gain_interval(self, fit: Fit, base: Fit) -> tuple[float, float]:
         """Return the 95 % interval of the share by which a fit lowers a base's typical RMSE."""
-        before, after = (self.problem.measured - one.held_out for one in (base, fit))
+        problem = self.problem
+        before, after = (problem.measured - one.held_out for one in (base, fit))
         return significance.typical_gain_interval(
-            before, after, self.problem.block, self.problem.fold, self.small_error(), self._rng)
+            before, after, problem.block, problem.fold, problem.small_error, self._rng)
 
     def _typical(self, response: np.ndarray, least: float) -> float:
-        """Return the geometric mean over the folds of the RMSE of a response (n,)."""
-        squares = np.maximum(self._squares(response) + least ** 2, 1e-300)
-        return float(np.exp(0.5 * np.mean(np.log(squares))))
-
-    def _squares(self, response: np.ndarray) -> np.ndarray:
-        """Return the mean square error of a response (n,) in each fold, shape (folds,)."""
-        squares, rows = (np.bincount(self.problem.fold, weights=weights) for weights in (
-            (self.problem.measured - response) ** 2, np.ones(len(response))))
-        return squares[rows > 0] / rows[rows > 0]
-
-    def small_error(self) -> float:
-        """Return the error below which none matters."""
-        return max(self.problem.noise, SMALL_ERROR * float(np.ptp(self.problem.measured)))
+        """Return the typical error of a response (n,), differences below `least` aside."""
+        return float(significance.typical_error(self.problem.squares(response), least))
 
     def _log_odds(self, fit: Fit, base: Fit) -> float:
         """Return the log posterior odds of a fit against another one; see `probabilities`."""
@@ -326,7 +314,7 @@ class BenchSelection:
             (self.problem.measured - one.predicted) ** 2, self.problem.block)
             for one in (base, fit))
         return (before - after) / (
-            before + after + self.small_error() ** 2 * np.bincount(self.problem.block))
+            before + after + self.problem.small_error ** 2 * np.bincount(self.problem.block))
 
     def _significance(self, fits: Sequence[Fit], base: Fit) -> np.ndarray:
         """Return family-wise p values of what fits explain beyond a base."""

@@ -75,7 +75,7 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
             kind, missing or resembles, named, hidden),
         effects=effects, rmse_before=selection.typical_rmse(base),
         rmse_after=selection.typical_rmse(selection.found), pooled_before=selection.error(base),
-        pooled_after=selection.error(selection.found), small_error=selection.small_error(),
+        pooled_after=selection.error(selection.found), small_error=selection.problem.small_error,
         not_excited=hidden, event=None,
         signal=unexplained_signal(problem, residual) if unknown else '', resembles=resembles)
 

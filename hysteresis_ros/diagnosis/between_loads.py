@@ -20,6 +20,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.bench_problem import SAME_LOAD
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.forms import simplest_forms
+from hysteresis_ros.diagnosis.significance import typical_error
 from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from hysteresis_ros.effects import Effect
 
 
-def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], small: float,
-                       practical: float) -> list[Effect]:
+def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], practical: float
+                       ) -> list[Effect]:
     """
     Return those of some effects that predict the loads between others best together.
 
@@ -39,8 +40,6 @@ def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], small: fl
         Rows, under three loads or more.
     effects : sequence of Effect
         Effects at their usual values, of which all sets are tried in their simplest forms.
-    small : float
-        Error that does not matter, in the unit of the response.
     practical : float
         Share by which the error between loads has to be less than without any of them, and by
         which the error of the rows fitted must not be more.
@@ -52,20 +51,20 @@ def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], small: fl
         better than none.
     """
     base = fitter.cross_validate(fitter.fit([]))
-    largest = (1.0 - practical) * _typical_error(fitter, base, small, _ends(fitter))
-    largest_fitted = (1.0 + practical) * _typical_error(fitter, base, small)
+    largest = (1.0 - practical) * _error_between(fitter, base)
+    largest_fitted = (1.0 + practical) * _error_fitted(fitter, base)
 
     def judged(some: Sequence[Effect]) -> tuple[float, list[Effect]]:
         own = fitter.apart()
         with np.errstate(all='ignore'):
             fit = own.fit(some)
             if (not np.all(np.isfinite(fit.predicted)) or fit.implausible()
-                    or _typical_error(own, fit, small) > largest_fitted):
+                    or _error_fitted(own, fit) > largest_fitted):
                 return np.inf, []
             found = own.with_intervals(fit)
             if any(not_determined(one, own.problem.kind) for one in found):
                 return np.inf, []
-            return _typical_error(own, own.cross_validate(fit), small, _ends(own)), found
+            return _error_between(own, own.cross_validate(fit)), found
 
     forms = simplest_forms(effects)
     simple = [effect.with_values(**forms.get(effect.id, {})) for effect in effects]
@@ -75,25 +74,18 @@ def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], small: fl
     return found if error <= largest else []
 
 
-def _ends(fitter: BenchFitter) -> np.ndarray:
-    """Return which folds have the lightest or the heaviest load, shape (folds,)."""
+def _error_fitted(fitter: BenchFitter, fit: Fit) -> float:
+    """Return the typical error of the rows fitted."""
+    problem = fitter.problem
+    return float(typical_error(problem.squares(fit.predicted), problem.small_error))
+
+
+def _error_between(fitter: BenchFitter, fit: Fit) -> float:
+    """Return the typical error of loads left out, of which those at the ends count as fitted."""
     problem = fitter.problem
     loads = np.array([np.mean(problem.signals['load'][problem.fold == fold])
                       for fold in problem.folds])
     same = SAME_LOAD * np.ptp(loads)
-    ends: np.ndarray = (loads <= loads.min() + same) | (loads >= loads.max() - same)
-    return ends
-
-
-def _typical_error(fitter: BenchFitter, fit: Fit, small: float,
-                   fitted: np.ndarray | None = None) -> float:
-    """
-    Return the geometric mean over the folds of the RMSE, `small` added to each.
-
-    Of rows held out in all folds but those that count as `fitted` (folds,), by default all.
-    """
-    problem = fitter.problem
-    fitted = np.ones(len(problem.folds), dtype=bool) if fitted is None else fitted
-    squares = [np.mean((problem.measured - (fit.predicted if one else fit.held_out))[
-        problem.fold == fold] ** 2) + small ** 2 for fold, one in zip(problem.folds, fitted)]
-    return float(np.exp(0.5 * np.mean(np.log(np.maximum(squares, 1e-300)))))
+    ends = (loads <= loads.min() + same) | (loads >= loads.max() - same)
+    fitted, held_out = (problem.squares(one) for one in (fit.predicted, fit.held_out))
+    return float(typical_error(np.where(ends, fitted, held_out), problem.small_error))

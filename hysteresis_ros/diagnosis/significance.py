@@ -97,9 +97,30 @@ def schwarz_log_odds(before: float, after: float, rows: int, parameters: int) ->
     return rows * math.log(before / after) - 0.5 * math.log(rows) * parameters
 
 
+def typical_error(squares: np.ndarray, small: float) -> np.ndarray:
+    """
+    Return the geometric mean of the RMSE of several folds, `small` added to each.
+
+    Each fold has errors of its own size, unknown beforehand, so that the likelihood of all is that
+    of this mean.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (..., folds)
+        Mean square error of each fold.
+    small : float
+        RMSE below which a fold's error does not matter.
+
+    Returns
+    -------
+    ndarray, shape (...)
+    """
+    return np.exp(0.5 * np.mean(np.log(np.maximum(squares + small ** 2, 1e-300)), axis=-1))
+
+
 def typical_rmse(squares: np.ndarray, small: float) -> np.ndarray:
     """
-    Return the geometric mean of the RMSE of several folds, differences below `small` aside.
+    Return `typical_error` as a reader expects it: without what was added to each fold.
 
     Parameters
     ----------
@@ -113,9 +134,7 @@ def typical_rmse(squares: np.ndarray, small: float) -> np.ndarray:
     ndarray, shape (...)
         Between the least and the largest RMSE of the folds.
     """
-    with np.errstate(divide='ignore'):    # a fold without any error leaves none
-        mean = np.exp(np.mean(np.log(squares + small ** 2), axis=-1))
-    return np.sqrt(np.maximum(mean - small ** 2, 0.0))
+    return np.sqrt(np.maximum(typical_error(squares, small) ** 2 - small ** 2, 0.0))
 
 
 def typical_gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
