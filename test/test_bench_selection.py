@@ -119,7 +119,7 @@ def test_what_only_some_muscles_have_is_no_rival_of_what_every_loaded_one_has(
 
 
 def test_sets_are_tried_in_the_simplest_forms_of_their_equations(selection, monkeypatch):
-    """A form that fitted rows prefer may make a load that is left out hopeless."""
+    """A form that fitted rows prefer may predict a load that is left out far worse."""
     search, kinds = selection._search, catalogue()
     surroundings = selection.problem.model.surroundings
     shift = kinds['stress_dependence'](surroundings, C=0.8, follows=0.5)

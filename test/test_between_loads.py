@@ -91,7 +91,7 @@ def test_the_rows_fitted_must_not_be_worse():
 
 
 def test_sets_have_the_simplest_forms(fitter, effects, monkeypatch):
-    """A form that fitted rows prefer may be hopeless under a load that they do not have."""
+    """A form that fitted rows prefer may predict a load that they do not have far worse."""
     seen = []
     fit = BenchFitter.fit
     monkeypatch.setattr(BenchFitter, 'fit', lambda self, some, *args, **options: (

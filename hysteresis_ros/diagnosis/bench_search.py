@@ -176,7 +176,7 @@ class BenchSearch:
         """
         Return fits of several effects in the simplest forms of their equations.
 
-        A form that fitted rows prefer by little can make loads that are left out hopeless.
+        A form that fitted rows prefer by little may predict loads that are left out far worse.
         """
         sets = []
         for fit in fits:

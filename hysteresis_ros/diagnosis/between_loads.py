@@ -4,9 +4,9 @@
 What every loaded muscle has, judged under the loads of a bench that lie between others.
 
 A load that is left out is predicted from the others. The lightest and the heaviest one are
-extrapolated to, which a growth of the stroke that ends soon makes hopeless, and which no arm asks
-for whose loads the bench encloses; of those two the rows fitted count instead, as they do for the
-discrepancy of an arm (`discrepancy.length_errors`).
+extrapolated to, which says nothing where the stroke soon stops growing with the load, and which no
+arm asks for whose loads the bench encloses; of those two the rows fitted count instead, as they do
+for the discrepancy of an arm (`discrepancy.length_errors`).
 """
 
 from __future__ import annotations
