@@ -279,22 +279,28 @@ class BenchSelection:
     def _log_odds(self, fit: Fit, base: Fit) -> float:
         """Return the log posterior odds of a fit against another one; see `probabilities`."""
         count = len(np.unique(self.problem.block))
-        prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
         before, after = (self.typical_error(one, self.problem.noise) for one in (base, fit))
-        return prior * (len(fit.effects) - len(base.effects)) + count * math.log(before / after)
+        return self._prior_log_odds(fit, base) + count * math.log(before / after)
 
     def _fitted_log_odds(self, fit: Fit, base: Fit) -> float:
         """
         Return the log posterior odds of a fit against another one by the rows that both fit.
 
-        By Schwarz's criterion, with as many independent rows as there are blocks. What every loaded
-        muscle has is not improbable beforehand, or a rare effect would stand for two of it.
+        By Schwarz's criterion, with as many independent rows as there are blocks.
         """
         count = len(np.unique(self.problem.block))
-        prior = math.log(self.settings.prior / (1.0 - self.settings.prior))
         before, after = (self._typical(one.predicted, self.problem.noise) for one in (base, fit))
-        return (prior * (not_universal(fit) - not_universal(base)) + significance.schwarz_log_odds(
-            before, after, count, self._parameters(fit) - self._parameters(base)))
+        return self._prior_log_odds(fit, base) + significance.schwarz_log_odds(
+            before, after, count, self._parameters(fit) - self._parameters(base))
+
+    def _prior_log_odds(self, fit: Fit, base: Fit) -> float:
+        """
+        Return the log odds of a fit's effects against those of another one, before any data.
+
+        What every loaded muscle has is not improbable, or a rare effect would stand for two of it.
+        """
+        one = math.log(self.settings.prior / (1.0 - self.settings.prior))
+        return one * (not_universal(fit) - not_universal(base))
 
     def _parameters(self, fit: Fit) -> int:
         """Return how many parameters of a fit the response depends on."""
