@@ -34,40 +34,6 @@ def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
     assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
 
 
-def test_the_way_done_counts_only_drives_that_the_response_follows():
-    drive = np.array([0.0, 1.0, 2.0, 4.0, 2.0, 1.0, 0.0])
-    trial = np.zeros(7, dtype=int)
-    flat_to_one = np.array([5.0, 5.0, 8.0, 14.0, 8.0, 5.0, 5.0])
-    found = discrepancy.way_done(drive, flat_to_one, trial)
-    assert found == pytest.approx(np.array([0.0, 0.0, 3.0, 9.0, 3.0, 0.0, 0.0]) / 9.0)
-    # Where it follows everywhere alike, it is the drive itself.
-    even = discrepancy.way_done(drive, -3.0 * drive, trial)
-    assert even == pytest.approx(drive / 4.0)
-    # Both branches of a loop count: here one moves below 2 and one above.
-    loop = discrepancy.way_done(np.array([0.0, 2.0, 4.0, 2.0, 0.0]),
-                                np.array([0.0, 0.0, 6.0, 6.0, 0.0]), np.zeros(5, dtype=int))
-    assert loop == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
-
-
-def test_the_way_of_a_held_drive_lies_beside_it_and_none_between_trials():
-    drive, trial = np.array([0.0, 1.0, 1.0, 2.0, 3.0]), np.zeros(5, dtype=int)
-    late = discrepancy.way_done(drive, np.array([0.0, 0.0, 4.0, 4.0, 4.0]), trial)
-    assert late == pytest.approx([0.0, 0.5, 0.5, 1.0, 1.0])
-    apart = discrepancy.way_done(np.array([0.0, 1.0, 3.0, 4.0]), np.array([0.0, 1.0, 9.0, 10.0]),
-                                 np.array([0, 0, 1, 1]))
-    assert apart == pytest.approx([0.0, 0.5, 0.5, 1.0])
-    still = np.zeros(4, dtype=int)
-    for drive, response in ((np.arange(4.0), np.ones(4)), (np.ones(4), np.arange(4.0))):
-        assert not np.any(discrepancy.way_done(drive, response, still))
-
-
-def test_drives_that_differ_by_rounding_are_one_on_the_way():
-    drive = np.array([0.0, 1.0, 2.0, np.nextafter(2.0, 3.0), 3.0])
-    response, trial = np.array([0.0, 1.0, 3.0, 6.0, 7.0]), np.zeros(5, dtype=int)
-    assert discrepancy.way_done(drive, response, trial) == pytest.approx(
-        discrepancy.way_done(np.round(drive, 3), response, trial))
-
-
 @pytest.mark.parametrize('name, values', [
     ('stress_dependent_strain', {'r': 0.6, 'F0': 1.2}), ('phase_modulus', {'m': 0.3})])
 def test_what_martensite_may_keep_of_its_load_is_an_error_of_all_rows_together(name, values):

@@ -37,6 +37,7 @@ from hysteresis_ros.effects.ambient import AmbientTemperature
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.formation_memory import FormationMemory
 from hysteresis_ros.measurements.metrics import halfway
+from hysteresis_ros.measurements.way import unit, way_done
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -49,8 +50,6 @@ DIRECTIONAL = 0.5
 KEPT = 1.0 / math.sqrt(3.0)
 # By how much the full drive heats a muscle above the room [K], about.
 FULL_HEAT = 80.0
-# Decimals, in parts of its range, to which two drives differ.
-DRIVE_DECIMALS = 9
 # Of as many loads one lies between others, and tells what the model does between them.
 FEWEST_LOADS = 3
 
@@ -270,7 +269,7 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     known = (FormationMemory.id in {*tried, *(effect.id for effect in effects)}
              or not FormationMemory.available(problem.model.surroundings))
     return Discrepancy(
-        parts, np.column_stack([way_done(drive, predicted, problem.trial), _unit(predicted)])
+        parts, np.column_stack([way_done(drive, predicted, problem.trial), unit(predicted)])
         / settings.correlation, common,
         np.zeros(len(predicted)) if known else formation_change(problem, effects),
         np.zeros((len(predicted), 0)))
@@ -348,43 +347,3 @@ def room_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
         surroundings, gain=surroundings.full_drive_squared / FULL_HEAT,
         reference=float(np.mean(ambient)))
     return _change_by(typical, problem, effects)
-
-
-def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.ndarray:
-    """
-    Return for each row the share of the response's way that is done below its drive, from 0 to 1.
-
-    Each change from row to row counts evenly over the drives between the two, or, while the drive
-    is held, over those next to it.
-
-    Parameters
-    ----------
-    drive, response : ndarray, shape (n,)
-    trial : ndarray of int, shape (n,)
-        Trial of each row.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        All 0 where drive or response stand still.
-    """
-    span = float(np.ptp(drive))
-    if span == 0.0:
-        return np.zeros(len(drive))
-    # Drives that differ by rounding are one.
-    levels, place = np.unique(np.round((drive - drive.min()) / span, DRIVE_DECIMALS),
-                              return_inverse=True)
-    low, high = (edge(place[:-1], place[1:]) for edge in (np.minimum, np.maximum))
-    held, last = low == high, len(levels) - 1
-    low, high = np.maximum(low - held, 0), np.minimum(high + held, last)
-    way = np.where(np.diff(trial) == 0, np.abs(np.diff(response)), 0.0)
-    share = way / (levels[high] - levels[low])
-    slope = np.zeros(len(levels))
-    np.add.at(slope, low, share)
-    np.add.at(slope, high, -share)
-    done = np.cumsum(np.cumsum(slope)[:-1] * np.diff(levels))
-    return _unit(np.append(0.0, done))[place]
-
-
-def _unit(values: np.ndarray) -> np.ndarray:
-    return (values - values.min()) / max(np.ptp(values), 1e-12)
