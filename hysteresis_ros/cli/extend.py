@@ -30,8 +30,8 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
         'shows the error before and after, also on the recordings of --test, which are not '
         'fitted.')
     add_model(parser)
-    parser.add_argument('--add', required=True, metavar='EFFECT[,EFFECT]',
-                        help='effects to add, in order')
+    parser.add_argument('--add', required=True, action='append', metavar='EFFECT[,EFFECT]',
+                        help='effects to add, in order; may be given several times')
     parser.add_argument('--data', nargs='+', type=InputPath, required=True, metavar='TRAIN',
                         help='recordings to fit: CSV files or rosbag2 folders')
     parser.add_argument('--test', nargs='+', type=InputPath, default=[], metavar='TEST',
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> None:
     model = MuscleModel.load(args.model)
     train, unseen = divided(read_all(args.data, args), args.trials)
     test = [*unseen, *read_all(args.test, args)]
-    names = [name.strip() for name in args.add.split(',') if name.strip()]
+    names = [name.strip() for name in ','.join(args.add).split(',') if name.strip()]
     if args.values is None:
         extension = extend(model, names, train, test, force=args.force)
     else:
