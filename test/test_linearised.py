@@ -10,7 +10,7 @@ from scipy import stats
 
 from hysteresis_ros.diagnosis.covariance import Covariance
 from hysteresis_ros.diagnosis.discrepancy import Discrepancy
-from hysteresis_ros.diagnosis.linearised import Linearised, Start
+from hysteresis_ros.diagnosis.linearised import _alive, Linearised, Start
 from hysteresis_ros.effects import catalogue
 
 NAMES = list(catalogue())
@@ -154,3 +154,15 @@ def test_a_p_value_is_never_zero():
     values = Linearised(covariance.points, residual, starts).p_values(
         point, np.random.default_rng(0), 50)
     assert min(values.values()) == pytest.approx(1.0 / 51.0)
+
+
+def test_starts_that_nothing_leads_away_from_are_left_out():
+    """Unless an effect has no other: then it is known that it does nothing there."""
+    _, starts = make(1, 40)
+    for start, dead in zip(starts, (True, False, False, True)):
+        start.effect = catalogue()[NAMES[0] if start in starts[:3] else NAMES[1]]()
+        if dead:
+            start.columns = 1e-6 * start.columns
+    starts[2].columns, starts[2].change = 1e-6 * starts[2].columns, np.full(40, 1e-3)
+    assert _alive(starts[:4], 1e-4) == starts[1:4]
+    assert _alive(starts[:4], 1e-9) == starts[:4]

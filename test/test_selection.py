@@ -235,6 +235,24 @@ def test_a_planted_effect_has_the_smallest_p_value_that_the_draws_allow(payload)
         1.0 / (1 + payload.settings.draws))
 
 
+def test_a_single_effect_that_is_fitted_better_is_tested_anew(model):
+    """Where its first fit was stuck, its p value is that of what it came to be."""
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+    single = frozenset(['payload_error'])
+    best, least = found.sets.fits[single], 1.0 / (1.0 + found.settings.draws)
+    found.alone.starts = [one for one in found.alone.starts if one.id != 'payload_error']
+    stuck, = found.fitter.fit([[best.effects[0].with_values(dm=0.01)]], found.fitting.metric, 0)
+    found.sets.fits[single] = dataclasses.replace(stuck, jacobian=0.0 * stuck.jacobian)
+    found._test_singles()
+    assert found.sets.p_values['payload_error'] > 0.05
+    values = dict(found.sets.p_values)
+    found._test_singles()
+    assert found.sets.p_values == values
+    found.sets.fits[single] = best
+    found._test_singles()
+    assert found.sets.p_values['payload_error'] == pytest.approx(least)
+
+
 def test_the_same_seed_gives_the_same_p_values(model):
     """And another one others, or nothing would be drawn."""
     measured = recording(model, noise=0.035)

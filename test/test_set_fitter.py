@@ -27,6 +27,27 @@ def test_a_fit_that_is_better_from_the_least_squares_on_is_kept(model, monkeypat
     assert found.sets.fits[frozenset(['payload_error'])].log_evidence == 1e6
 
 
+def test_what_leaves_the_least_error_is_fitted_to_the_end_whatever_its_evidence(
+        model, monkeypatch):
+    """An effect that bends the response is, after a few steps, behind what changes nothing."""
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+    fitting, measured = found.fitting, found.problem.measured
+    begun = [dataclasses.replace(
+        found.sets.fits[frozenset([name])], log_evidence=evidence, predicted=measured + error)
+        for name, evidence, error in zip(TRIED, (3.0, 2.0, 1.0, 0.0), (0.4, 0.3, 0.2, 0.1))]
+    ended = []
+    monkeypatch.setattr(fitting.fitter, 'fit', lambda *args, **options: begun)
+    monkeypatch.setattr(fitting, 'fit', lambda sets: ended.extend(
+        effects[0].id for effects in sets))
+    rest = fitting.begin([[]], 1)
+    assert ended == [TRIED[0], TRIED[3]]
+    assert [fit.names[0] for fit in rest] == list(TRIED[1:3])
+    ended.clear()
+    # Nothing twice.
+    assert fitting.begin([[]], 4) == []
+    assert ended == list(TRIED)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('hidden, judged', [
     ({'payload_error': {'dm': -15.0}, 'supply_sag': {'Rs': 0.8}}, None),

@@ -99,7 +99,20 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
         mean, spread = walk.parameters.prior()
         found.append(Start(walk.start, response - fit.predicted + jacobian @ (
             mean - walk.vector), jacobian * spread))
-    return found
+    return _alive(found, problem.noise)
+
+
+def _alive(starts: Sequence[Start], least: float) -> list[Start]:
+    """
+    Return the starts that a fit can get away from, of effects that have one.
+
+    Where nothing changes, however the parameters move, no derivative says where to go: a stop far
+    from all angles of the arm.
+    """
+    alive = [max(np.max(np.abs(start.change)), np.max(np.abs(start.columns), initial=0.0)) > least
+             for start in starts]
+    names = {start.id for start, own in zip(starts, alive) if own}
+    return [start for start, own in zip(starts, alive) if own or start.id not in names]
 
 
 def singles_as_started(fitter: Fitter, fit: Fit, names: Sequence[str]

@@ -11,7 +11,7 @@ full fits.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import dataclasses
 import itertools
 import math
@@ -86,6 +86,8 @@ class Selection:
         self.fitting = SetFitter(self.sets)
         self._grown: set[frozenset[str]] = set()
         self._exchanged: set[frozenset[str]] = set()
+        # Responses of single effects when they were tested against chance.
+        self._tested: dict[frozenset[str], np.ndarray] = {}
         # Each with the response that it belongs to.
         self._linearised: dict[frozenset[str], tuple[np.ndarray, Linearised]] = {}
         self.alone: Linearised
@@ -128,7 +130,7 @@ class Selection:
         starts = [[effect] for effect in self.alone.best_starts()]
         for fit in self.fitting.begin(starts, BEGUN * self.settings.refits):
             self.sets.keep(fit)
-        self.sets.p_values = self._significance()
+        self._test_singles()
         self._grown.add(frozenset())
         self.fitting.refine(1)
 
@@ -146,13 +148,24 @@ class Selection:
             if size == 1 and not any(map(self.sets.sufficient, self.sets.valid())):
                 self._fit_from_all_starts(2)
         self.fitting.refine_best()
+        self._test_singles()
         self._exchange()
+        self._test_singles()
 
-    def _significance(self) -> dict[str, float]:
+    def _test_singles(self) -> None:
+        """Test single effects anew where some were fitted better than when they were tested."""
+        singles = {names: fit for names, fit in self.sets.fits.items() if len(names) == 1}
+        predicted = {names: fit.predicted for names, fit in singles.items()}
+        if predicted.keys() != self._tested.keys() or any(
+                predicted[names] is not self._tested[names] for names in predicted):
+            self._tested = predicted
+            self.sets.p_values = self._significance(singles.values())
+
+    def _significance(self, singles: Iterable[Fit]) -> dict[str, float]:
         """Return family-wise p values of single effects, linearised at starts and at fits too."""
         fitted, base = [], self.sets.base
-        for fit in self.sets.fits.values():
-            if fit.effects:
+        for fit in singles:
+            if len(fit.vector):
                 mean, spread = ParameterVector(fit.effects, self.problem.kind).prior()
                 change = fit.predicted - base.predicted + fit.jacobian @ (mean - fit.vector)
                 fitted.append(Start(fit.effects[0], change, fit.jacobian * spread))

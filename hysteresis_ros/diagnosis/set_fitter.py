@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Sets that are begun, for one that is fitted to the end, and steps of what is begun.
 BEGUN, FIRST_STEPS = 3, 3
+# Of as many sets as are fitted to the end for their evidence one more is for its little error.
+FOR_ERROR = 3
 
 
 class SetFitter:
@@ -47,11 +49,14 @@ class SetFitter:
         """
         Fit sets for a few steps, and the best of these to the end, each from one start.
 
+        After a few steps an effect that bends the response may still be far from its maximum, and
+        behind all that hardly change anything: those that leave the least error go on, too.
+
         Parameters
         ----------
         sets : sequence of list of Effect
         most : int
-            How many are fitted to the end.
+            How many are fitted to the end for their evidence.
 
         Returns
         -------
@@ -62,8 +67,14 @@ class SetFitter:
         best: dict[tuple[str, ...], Fit] = {}
         for fit in sorted(begun, key=lambda fit: -fit.log_evidence):
             best.setdefault(fit.names, fit)
-        self.fit([fit.effects for fit in list(best.values())[:most]])
-        return list(best.values())[most:]
+        chosen = list(best.values())[:most]
+        rest = sorted(begun, key=lambda fit: self.fitter.error(fit.predicted))
+        for fit in rest[:max(1, most // FOR_ERROR)]:
+            if all(fit.names != other.names for other in chosen):
+                chosen.append(fit)
+        self.fit([fit.effects for fit in chosen])
+        done = {fit.names for fit in chosen}
+        return [fit for names, fit in best.items() if names not in done]
 
     def fit(self, sets: Sequence[Sequence[Effect]]) -> None:
         """Fit sets to the end, and keep each where it is the best of its effects."""
