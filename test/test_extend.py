@@ -244,6 +244,9 @@ def test_the_command_says_the_gain_and_writes_model_json_and_page(
     assert main(command) == 1
     error = capsys.readouterr().err
     assert error.count('\n') == 1 and 'gremlins' in error
+    # Of two options both count.
+    assert main([*command, '--add', 'payload_error']) == 1
+    assert 'gremlins' in capsys.readouterr().err
 
 
 def test_the_recording_is_not_overwritten(base, recordings, tmp_path, capsys):
