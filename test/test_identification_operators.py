@@ -8,9 +8,8 @@ import pytest
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.first_stage import first_stage_from_lengths, power_stage
 from hysteresis_ros.identification.operators import (
-    fit_operator, fit_preisach, preisach_rows, smoothness, thinned)
-from hysteresis_ros.operators import (
-    BoucWen, Linear, Preisach, PrandtlIshlinskii, cell_areas, cells)
+    fit_operator, fit_preisach, preisach_rows, thinned)
+from hysteresis_ros.operators import BoucWen, Linear, Preisach, PrandtlIshlinskii
 
 OSCILLATION = np.concatenate([np.linspace(a, b, n + 1)[1:] for a, b, n in (
     (0, 6, 15), (6, 0, 15), (0, 5.6, 13), (5.6, 0.8, 11), (0.8, 5, 9), (5, 1.8, 8), (1.8, 4, 6))])
@@ -94,27 +93,6 @@ def test_grid_is_placed_where_it_fits_better():
     for operator, _ in (usual, placed):
         assert operator.lower <= 0.0 and operator.upper >= 6.0
         assert operator.lower >= -0.31 and operator.upper <= 6.31
-
-
-def test_penalty_is_on_densities_of_neighbours_along_the_diagonal():
-    nodes = np.array([0.0, 1.0, 2.0, 4.0])
-    root = smoothness(nodes, reversible=True)
-    areas = cell_areas(nodes)
-    beta, alpha = cells(3)
-    # A weight that depends on alpha - beta alone costs the ridge only.
-    band = np.append(1.0 + alpha - beta, np.zeros(3)) * np.append(areas, np.zeros(3)) / 16.0
-    assert np.sum((root @ band)[:3] ** 2) == pytest.approx(0.0, abs=1e-20)
-    assert np.sum((root @ band) ** 2) == pytest.approx(
-        0.1 * np.sum((1.0 + alpha - beta) ** 2 * areas / 16.0))
-    # The same density on a grid twice as fine costs about the same.
-    costs = []
-    for levels in (10, 20):
-        grid = np.linspace(-3.0, 2.0, levels + 1)
-        middle = (grid[1:] + grid[:-1]) / 2.0
-        i, j = cells(levels)
-        weights = np.sin(0.5 * (middle[i] + middle[j])) * cell_areas(grid) / 25.0
-        costs.append(np.sum((smoothness(grid) @ weights) ** 2))
-    assert costs[0] == pytest.approx(costs[1], rel=0.1)
 
 
 def test_rows_are_areas_and_lengths():

@@ -13,7 +13,8 @@ from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.least_squares import (
     Anchor, fit_weights, folds_of, quick_weights, SLACK, solve_nonnegative, STRENGTHS)
 from hysteresis_ros.identification.nonnegative import solve_rows
-from hysteresis_ros.identification.operators import smoothness
+from hysteresis_ros.identification.nonnegative import extrapolated
+from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.operators import cell_areas, signed_areas
 
 OSCILLATION = np.concatenate([np.linspace(a, b, n + 1)[1:] for a, b, n in (
@@ -352,3 +353,19 @@ def test_nnls_that_gives_up_is_one_line(monkeypatch):
     design, target, _ = problem(0)
     with pytest.raises(IdentificationError, match='strength above 0'):
         fit_weights(design, target, strength=0.0)
+
+
+def test_what_the_fitted_rows_hardly_excite_does_not_predict_the_others():
+    """It would take up any misfit of them, and move the rows held out by many times as much."""
+    rng = np.random.default_rng(0)
+    known = rng.uniform(0.0, 1.0, 60)
+    hardly = np.where(np.arange(60) < 40, 0.02 * (np.arange(60) % 5 == 0), 1.0)
+    target = known + 0.02 * (hardly > 0.0) * (np.arange(60) < 40) + 0.005 * rng.standard_normal(60)
+    trial = np.repeat([0, 1, 2], 20)
+    fit = fit_weights(np.column_stack([known, hardly]), target, groups=trial, strength=None,
+                      strengths=[1e-6])
+    # Taken at its word, the second column would add 1 to the last trial.
+    assert np.abs(fit.held_out[trial == 2]).max() < 0.1
+    factors = extrapolated(np.column_stack([known, hardly, 0.0 * known]), trial < 2)
+    assert factors == pytest.approx([(known.max() / known[:40].max()) ** 2 - 1.0, 2499.0, 0.0])
+    assert extrapolated(hardly[:, None], hardly == 0.0) == pytest.approx([1e6 - 1.0])

@@ -7,7 +7,10 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from scipy import sparse
 
+from hysteresis_ros.identification.grid import nodes_along
+from hysteresis_ros.identification.smoothness import smoothness_square
 from hysteresis_ros.kernels.shares import shares
 from hysteresis_ros.operators import cell_areas, Preisach
 
@@ -38,21 +41,34 @@ class Excitation:
         Where each trial ends.
     wanted : ndarray of bool, shape (rows + trials,)
         Inputs whose output is judged.
+    response : ndarray, shape (n,)
+        Measured, for each input wanted.
+    trial : ndarray of int, shape (n,)
+        Trial of each of them.
     """
 
-    def __init__(self, inputs: np.ndarray, ends: np.ndarray, wanted: np.ndarray) -> None:
+    def __init__(self, inputs: np.ndarray, ends: np.ndarray, wanted: np.ndarray,
+                 response: np.ndarray, trial: np.ndarray) -> None:
         self.inputs = inputs
         self._ends, self._wanted = ends, wanted
+        self._response, self._trial = response, trial
         self._nodes: dict[int, np.ndarray] = {}
         self._shares: dict[int, np.ndarray] = {}
+        self._smoothness: dict[int, sparse.csr_matrix] = {}
 
     def nodes(self, levels: int) -> np.ndarray:
-        """Return a grid of equal intervals over the inputs, shape (levels + 1,)."""
+        """Return a grid that is dense where the response goes its way, shape (levels + 1,)."""
         if levels not in self._nodes:
-            low, high = self.inputs.min(), self.inputs.max()
-            margin = 1e-6 * max(high - low, 1e-12)
-            self._nodes[levels] = np.linspace(low - margin, high + margin, levels + 1)
+            self._nodes[levels] = nodes_along(
+                self.inputs.min(), self.inputs.max(), self.inputs[self._wanted], self._response,
+                self._trial, levels)
         return self._nodes[levels]
+
+    def smoothness(self, levels: int) -> sparse.csr_matrix:
+        """Return the penalty on rough weights on that grid; see `smoothness_square`."""
+        if levels not in self._smoothness:
+            self._smoothness[levels] = smoothness_square(self.nodes(levels))
+        return self._smoothness[levels]
 
     def shares(self, levels: int, scale: np.ndarray, columns: np.ndarray | None = None
                ) -> np.ndarray:
@@ -97,12 +113,14 @@ class Design:
     The least squares problem of H2's weights.
 
     `shares` (n, K + 1) say what each weight, times the size of its cell, and last the bias
-    contribute to the response; `known` (n,) is the part without weights.
+    contribute to the response; `known` (n,) is the part without weights; `smoothness` (K + 1,
+    K + 1) is the penalty on rough ones.
     """
 
     shares: np.ndarray
     known: np.ndarray
     nodes: np.ndarray
+    smoothness: sparse.csr_matrix
 
     @property
     def rows(self) -> np.ndarray:

@@ -21,7 +21,8 @@ import numpy as np
 
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.least_squares import SLACK, WeightFit, fit_weights
-from hysteresis_ros.identification.operators import fit_operator, smoothness
+from hysteresis_ros.identification.operators import fit_operator
+from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.model.linear import LinearModel
 from hysteresis_ros.model.muscle import COLD_DRIVE
 from hysteresis_ros.operators import (

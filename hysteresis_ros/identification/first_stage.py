@@ -14,7 +14,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hysteresis_ros.identification.nonnegative import quick_weights
-from hysteresis_ros.identification.operators import preisach_rows, smoothness, thinned
+from hysteresis_ros.identification.operators import preisach_rows, thinned
+from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.operators import Linear, Preisach, cell_areas
 
 # Levels, strength and rows of the second stages that H1's candidates are compared by.

@@ -30,7 +30,8 @@ import numpy as np
 from scipy import linalg, sparse
 
 from hysteresis_ros.errors import IdentificationError
-from hysteresis_ros.identification.nonnegative import quick_weights, solve_nonnegative
+from hysteresis_ros.identification.nonnegative import (
+    extrapolated, quick_weights, solve_nonnegative)
 from hysteresis_ros.identification.weight_fit import WeightFit
 from hysteresis_ros.workers import one_blas_thread
 
@@ -264,9 +265,11 @@ class _Problem:
         errors = np.empty((len(strengths), len(self.target)))
         for held in self.folds:
             gram, moment = self._moments(~held)
+            curvature = self._curvature + np.diag(
+                extrapolated(self.design, ~held) * np.diag(self._curvature))
             for k, strength in enumerate(strengths):
                 x, _ = solve_nonnegative(
-                    gram + strength * self._curvature, moment, self.free, path[k][1])
+                    gram + strength * curvature, moment, self.free, path[k][1])
                 errors[k, held] = self.design[held] @ x - self.target[held]
         return errors
 

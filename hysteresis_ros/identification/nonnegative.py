@@ -21,6 +21,8 @@ SINGULAR = 1        # state of `pivot`
 FEWEST_MORE = 10
 # Share of unknowns off their bound from which on all are taken at once.
 MANY = 0.3
+# Share of its excitation below which an unknown counts as not excited at all.
+LEAST_EXCITED = 1e-3
 NO_SOLUTION = 'least squares: the problem is singular; use a strength above 0'
 
 
@@ -131,6 +133,30 @@ def part_of(penalty: sparse.csr_matrix, index: np.ndarray) -> np.ndarray:
     """Return the rows and columns `index` (P,) of a penalty, shape (P, P)."""
     # SciPy's own indexing takes ten times as long for a part this small.
     return part(penalty.indptr, penalty.indices, penalty.data, index)
+
+
+def extrapolated(design: np.ndarray, train: np.ndarray) -> np.ndarray:
+    """
+    Return by what share more each unknown is to be penalised where some rows alone are fitted.
+
+    An unknown that they hardly excite may take up any misfit of them, and then moves the other rows
+    by many times as much. It is penalised as if those rows excited it as much as the others do.
+
+    Parameters
+    ----------
+    design : ndarray, shape (n, K)
+        All rows.
+    train : ndarray of bool, shape (n,)
+        Rows that are fitted.
+
+    Returns
+    -------
+    ndarray, shape (K,)
+    """
+    every, fitted = (np.max(np.abs(part), axis=0) for part in (design, design[train]))
+    # What no row excites has the penalty that it has.
+    return np.divide(every, np.maximum(fitted, LEAST_EXCITED * every), out=np.ones(len(every)),
+                     where=every > 0.0) ** 2 - 1.0
 
 
 def solve(gram: np.ndarray, moment: np.ndarray) -> np.ndarray:

@@ -9,18 +9,16 @@ import numpy as np
 
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bouc_wen import fit_bouc_wen
+from hysteresis_ros.identification.grid import MARGIN
 from hysteresis_ros.identification.least_squares import (
     SLACK, STRENGTHS, Anchor, WeightFit, fit_weights, quick_weights)
+from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.operators import (
-    HysteresisOperator, Linear, Preisach, PrandtlIshlinskii, cell_areas, cells,
-    signed_areas, signed_lengths)
+    HysteresisOperator, Linear, Preisach, PrandtlIshlinskii, cell_areas, signed_areas,
+    signed_lengths)
 
-# The grid reaches at least this far beyond the data, as a share of the data's range.
-MARGIN = 1e-6
 # And, where its place is searched for, up to one interval of the usual grid at either end.
 MARGINS = (0.0, 0.0125, 0.025, 0.0375, 0.05)
-# Of the penalty: density of the cells, and of the reversible weights, against its smoothness.
-CELL_RIDGE, REVERSIBLE_RIDGE = 0.1, 10.0
 # Rows that a search over parameters that are not weights looks at, besides the turning points.
 SEARCH_ROWS = 400
 
@@ -94,49 +92,6 @@ def fit_operator(kind: str, parts: Sequence[np.ndarray], target: np.ndarray, gro
     if kind == 'bouc-wen':
         return fit_bouc_wen(parts, target, low, high, _kept(parts), fitted=fitted), None
     raise IdentificationError(f'no operator of kind {kind!r}')
-
-
-def smoothness(nodes: np.ndarray, reversible: bool = False) -> np.ndarray:
-    """
-    Return the root of the penalty on a rough weight function.
-
-    It acts on weight times area (reversible weight times length), brought back to densities on a
-    plane of side 1, so that it means the same on every grid. Penalised are differences between
-    cells that are neighbours along the diagonal, because they stand for loops of the same width,
-    and, less, the densities themselves, so that cells without data stay at zero. Differences
-    across the diagonal are not: there the weight of a mild hysteresis rises steeply.
-
-    Parameters
-    ----------
-    nodes : ndarray, shape (N + 1,)
-        Grid.
-    reversible : bool
-        Whether columns for the N reversible weights follow those of the K cells.
-
-    Returns
-    -------
-    ndarray, shape (R, K) or (R, K + N)
-    """
-    width = np.diff(nodes) / (nodes[-1] - nodes[0])
-    beta, alpha = cells(len(width))
-    area = width[beta] * width[alpha] * np.where(beta == alpha, 0.5, 1.0)
-    place = {cell: k for k, cell in enumerate(zip(beta.tolist(), alpha.tolist()))}
-    pairs = [(k, place[b + 1, a + 1]) for (b, a), k in place.items() if (b + 1, a + 1) in place]
-    first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
-    # Squared distance of the two cells' middles, in units of a diagonal step on this grid.
-    step = (np.square(width[beta[first]] + width[beta[second]])
-            + np.square(width[alpha[first]] + width[alpha[second]])) / 8.0
-    gain = np.sqrt((area[first] + area[second]) / (2.0 * step))
-    differences = np.zeros((len(pairs), len(area)))
-    row = np.arange(len(pairs))
-    differences[row, first] = gain / area[first]
-    differences[row, second] = -gain / area[second]
-    root = np.vstack([differences, np.diag(np.sqrt(CELL_RIDGE / area))])
-    if not reversible:
-        return root
-    ridge = np.diag(np.sqrt(REVERSIBLE_RIDGE / width))
-    return np.block([[root, np.zeros((len(root), len(width)))],
-                     [np.zeros((len(width), len(area))), ridge]])
 
 
 def preisach_rows(nodes: np.ndarray, inputs: np.ndarray, reversible: bool = False) -> np.ndarray:

@@ -26,6 +26,24 @@ def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.n
     ndarray, shape (n,)
         All 0 where drive or response stand still.
     """
+    return way_below(drive, np.where(np.diff(trial) == 0, np.abs(np.diff(response)), 0.0))
+
+
+def way_below(drive: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """
+    Return the share of a way that is done below each row's drive.
+
+    Parameters
+    ----------
+    drive : ndarray, shape (n,)
+    steps : ndarray, shape (n - 1,)
+        Way from each row to the next, not negative.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        See `way_done`.
+    """
     span = float(np.ptp(drive))
     if span == 0.0:
         return np.zeros(len(drive))
@@ -35,8 +53,7 @@ def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.n
     low, high = (edge(place[:-1], place[1:]) for edge in (np.minimum, np.maximum))
     held, last = low == high, len(levels) - 1
     low, high = np.maximum(low - held, 0), np.minimum(high + held, last)
-    way = np.where(np.diff(trial) == 0, np.abs(np.diff(response)), 0.0)
-    share = way / (levels[high] - levels[low])
+    share = steps / (levels[high] - levels[low])
     slope = np.zeros(len(levels))
     np.add.at(slope, low, share)
     np.add.at(slope, high, -share)
