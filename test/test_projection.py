@@ -27,9 +27,11 @@ def test_derivatives_are_finite_differences_with_the_active_set_fixed():
     fitted, step = ProjectedWeights(design, target, penalty), 1e-6
     columns = fitted.columns
     assert 1 < len(columns) < 30
-    other = ProjectedWeights(design + step * slope, target + step * drift, penalty, fitted.passive)
+    moved = (1.0 + 10.0 * step) * penalty
+    other = ProjectedWeights(design + step * slope, target + step * drift, moved, fitted.passive)
     assert np.array_equal(other.passive, fitted.passive)
-    found = fitted.moved((design + step * slope)[:, columns], target + step * drift)
+    found = fitted.moved((design + step * slope)[:, columns], target + step * drift,
+                         moved.toarray()[np.ix_(columns, columns)])
     np.testing.assert_allclose(found - fitted.z[columns], (other.z - fitted.z)[columns],
                                atol=1e-4 * np.abs(other.z - fitted.z).max())
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 import math
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from hysteresis_ros.cli.common import (
     add_columns, add_json, add_model, add_report, add_settled, add_trials, divided, origin,
@@ -22,6 +22,16 @@ if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
 
 
+class Joined(argparse.Action):
+    """Lists of an option that is given several times, as one."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace,
+                 values: Any, option_string: str | None = None) -> None:
+        """Add a list to those before."""
+        before = getattr(namespace, self.dest)
+        setattr(namespace, self.dest, values if before is None else f'{before},{values}')
+
+
 def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     """Declare the command."""
     parser = subparsers.add_parser(
@@ -30,7 +40,7 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
         'shows the error before and after, also on the recordings of --test, which are not '
         'fitted.')
     add_model(parser)
-    parser.add_argument('--add', required=True, action='append', metavar='EFFECT[,EFFECT]',
+    parser.add_argument('--add', required=True, action=Joined, metavar='EFFECT[,EFFECT]',
                         help='effects to add, in order; may be given several times')
     parser.add_argument('--data', nargs='+', type=InputPath, required=True, metavar='TRAIN',
                         help='recordings to fit: CSV files or rosbag2 folders')
@@ -60,7 +70,7 @@ def run(args: argparse.Namespace) -> None:
     model = MuscleModel.load(args.model)
     train, unseen = divided(read_all(args.data, args), args.trials)
     test = [*unseen, *read_all(args.test, args)]
-    names = [name.strip() for name in ','.join(args.add).split(',') if name.strip()]
+    names = [name.strip() for name in args.add.split(',') if name.strip()]
     if args.values is None:
         extension = extend(model, names, train, test, force=args.force)
     else:

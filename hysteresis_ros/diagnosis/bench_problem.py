@@ -25,7 +25,7 @@ from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench import left_out
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
-from hysteresis_ros.identification.nonnegative import extrapolated
+from hysteresis_ros.identification.nonnegative import extrapolated, part_of
 from hysteresis_ros.identification.projection import ProjectedWeights
 from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.kernels.load_play import follow
@@ -353,8 +353,11 @@ class BenchProblem(Problem):
         train : ndarray of bool, shape (n,), optional
             The rows that the solution was fitted to.
         """
-        design = self._design(effects, phases=solution.phases, columns=solution.weights.columns)
-        z = solution.weights.moved(*self._rows(design, train))
+        columns = solution.weights.columns
+        design = self._design(effects, phases=solution.phases, columns=columns)
+        penalty = self._strength * part_of(design.smoothness, columns)
+        penalty.flat[::len(columns) + 1] += self._further(design, train) * np.diag(penalty)
+        z = solution.weights.moved(*self._rows(design, train), penalty)
         return self._response(effects, design, z)
 
     def _response(self, effects: Sequence[Effect], design: Design, z: np.ndarray) -> np.ndarray:
@@ -369,13 +372,19 @@ class BenchProblem(Problem):
         target = self.measured - design.known
         return (design.shares, target) if train is None else (design.shares[train], target[train])
 
+    @staticmethod
+    def _further(design: Design, train: np.ndarray | None) -> np.ndarray:
+        """Return by what share more each weight of a design is penalised; see `extrapolated`."""
+        shares = design.shares
+        return np.zeros(shares.shape[1]) if train is None else extrapolated(shares, train)
+
     def _projected(self, design: Design, train: np.ndarray | None) -> ProjectedWeights:
         # Neighbouring parameters have neighbouring weights.
         key = None if train is None else train.tobytes()
         penalty = self._strength * design.smoothness
         if train is not None:
             penalty += sparse.diags(
-                extrapolated(design.shares, train) * penalty.diagonal(), format='csr')
+                self._further(design, train) * penalty.diagonal(), format='csr')
         found = ProjectedWeights(*self._rows(design, train), penalty,
                                  self._passive.get(key, self._passive.get(None)))
         self._passive[key] = found.passive

@@ -89,6 +89,8 @@ def linearised_starts(fitter: Fitter, fit: Fit, names: Sequence[str],
                  if _key(start.effect) in usual}
         kept = _promising(walks, responses - fit.predicted, problem.measured - fit.predicted,
                           known, point)
+        # Those that did nothing alone are not known, and left out here, too.
+        kept = [index for index in kept if _key(walks[index].start) not in usual - known.keys()]
         walks, responses = [walks[index] for index in kept], responses[kept]
     moved = iter(fitter.simulate([effects for walk in walks for effects in walk.moved]))
     for walk, response in zip(walks, responses):

@@ -11,7 +11,7 @@ at their bound stay there, so that each takes one small linear problem instead o
 import numpy as np
 from scipy import sparse
 
-from hysteresis_ros.identification.nonnegative import part_of, solve, solve_rows
+from hysteresis_ros.identification.nonnegative import solve, solve_rows
 
 
 class ProjectedWeights:
@@ -42,9 +42,8 @@ class ProjectedWeights:
         free[-1] = True
         self.z, self.passive = solve_rows(design, target, penalty, free, start)
         self.columns = np.flatnonzero(self.passive)
-        self._penalty = part_of(penalty, self.columns)
 
-    def moved(self, design: np.ndarray, target: np.ndarray) -> np.ndarray:
+    def moved(self, design: np.ndarray, target: np.ndarray, penalty: np.ndarray) -> np.ndarray:
         """
         Return the weights for rows that differ a little.
 
@@ -53,11 +52,12 @@ class ProjectedWeights:
         design : ndarray, shape (n, P)
             Only the `columns`; all other weights stay at their bound.
         target : ndarray, shape (n,)
+        penalty : ndarray, shape (P, P)
 
         Returns
         -------
         ndarray, shape (P,)
             Of any sign.
         """
-        return solve(design.T @ design / len(target) + self._penalty,
+        return solve(design.T @ design / len(target) + penalty,
                      design.T @ target / len(target))
