@@ -421,6 +421,8 @@ def test_of_many_starts_the_best_is_linearised_with_other_effects(name):
     assert whole[0] == pytest.approx(part[0], rel=1e-9)
     usual_ones = [start.values for start in starts_of(effect_of(model, name), 'arm')]
     assert len(usual_ones) > 3
+    # None is of use that changes nothing, however it is moved.
+    assert all(np.any(start.change) or np.any(start.columns) for start in alone)
     assert sum(start.effect.values in usual_ones for start in few) == 1
     # What the response suggests is looked at in any case.
     suggested = [start.effect.values for start in every

@@ -3,8 +3,10 @@
 """Weights eliminated from a fit: their derivatives, and the rows that they are fitted to."""
 
 from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.diagnosis import bench_problem
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import catalogue
+from hysteresis_ros.identification import nonnegative
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.identification.projection import ProjectedWeights
 from hysteresis_ros.kernels.shares import shares
@@ -69,6 +71,20 @@ def test_weights_are_refitted_to_what_the_models_second_stage_is_given(problem):
                         for m in problem.measurements])
     refitted = problem.measured - problem.simulate([])
     assert np.std(refitted) < 1.2 * np.std(own) < 0.1 * np.std(problem.measured)
+
+
+def test_a_load_held_out_is_not_predicted_by_what_the_others_hardly_excite(problem, monkeypatch):
+    """The heaviest load goes through inputs that the others reach the edge of."""
+    held, train = problem.finer().holding_out(), problem.trial != 3
+    hardly = nonnegative.extrapolated(held._design([]).shares, train) > 100.0
+
+    def taken():
+        return np.sum(held.solve([], train).weights.z[hardly])
+
+    own = taken()
+    monkeypatch.setattr(bench_problem, 'extrapolated', lambda shares, train: np.zeros(
+        shares.shape[1]))
+    assert 0.0 <= own < 0.01 * taken()
 
 
 @pytest.mark.parametrize('name, values, parameter', [

@@ -239,6 +239,8 @@ def test_a_single_effect_that_is_fitted_better_is_tested_anew(model):
     """Where its first fit was stuck, its p value is that of what it came to be."""
     found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
     single = frozenset(['payload_error'])
+    assert all(found._tested[names] is fit.predicted
+               for names, fit in found.sets.fits.items() if len(names) == 1)
     best, least = found.sets.fits[single], 1.0 / (1.0 + found.settings.draws)
     found.alone.starts = [one for one in found.alone.starts if one.id != 'payload_error']
     stuck, = found.fitter.fit([[best.effects[0].with_values(dm=0.01)]], found.fitting.metric, 0)
