@@ -147,9 +147,12 @@ class Selection:
             self.fitting.refine(size + 1)
             if size == 1 and not any(map(self.sets.sufficient, self.sets.valid())):
                 self._fit_from_all_starts(2)
-        self.fitting.refine_best()
-        self._test_singles()
+        self._refine_best()
         self._exchange()
+
+    def _refine_best(self) -> None:
+        """Fit the most probable sets on, and test anew what that has changed."""
+        self.fitting.refine_best()
         self._test_singles()
 
     def _test_singles(self) -> None:
@@ -329,7 +332,7 @@ class Selection:
                     singles = singles_as_started(self.fitter, rest, self._others(rest))
                     self.fitting.begin(self._best_with(kept, singles, out), 1)
             self.fitting.refine(len(names))
-            self.fitting.refine_best()
+            self._refine_best()
 
     def _best_with(self, kept: Sequence[Effect],
                    scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
