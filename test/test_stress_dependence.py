@@ -122,7 +122,8 @@ def on_bench(muscle):
     trials = {'length_trials': range(4), 'force_trials': [0]}
     model = identify(length, force, geometry=BicepGeometry.from_mapping(GEOMETRY), **trials).model
     extended, added = add_effects(model, length, force, [
-        'stress_dependence', 'stress_dependent_strain', 'transformation_slopes'], **trials)
+        'stress_dependence', 'stress_dependent_strain', 'transformation_slopes',
+        'series_compliance'], **trials)
     return {effect.id: effect for effect in added}, extended.metrics
 
 

@@ -11,6 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
+import numpy as np
+
+from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.determined import not_determined
@@ -48,20 +51,24 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
     trial.fixed = [*fitter.fixed, *(effect for effect in effects if effect.id in fixed)]
     practical = Settings().practical
 
-    def fitted(forms: Forms) -> tuple[float, Fit]:
+    def fitted(forms: Forms) -> tuple[np.ndarray, Fit]:
         fit = trial.cross_validate(trial.fit(
             [effect.with_values(**forms.get(effect.id, {})) for effect in free]))
-        return trial.error(fit.held_out), fit
+        # To the error of all rows the least load contributes most, as the others are extrapolated
+        # to it; to the typical one, by which sets are compared, all contribute alike.
+        return np.array([trial.error(fit.held_out), significance.typical_error(
+            trial.problem.squares(fit.held_out), trial.problem.small_error)]), fit
 
     present = error, _ = fitted({})
     chosen = None
     if simplest:
         plain = fitted(simplest)
-        if not plain[1].implausible() and plain[0] <= (1.0 + practical) * error:
+        if not plain[1].implausible() and np.all(
+                plain[0] <= (1.0 + practical) * error):
             present, chosen = plain, plain[1]
     for forms in others:
         other = fitted({**simplest, **forms} if chosen is not None else forms)
-        if (not other[1].implausible() and other[0] < (1.0 - practical) * present[0]
+        if (not other[1].implausible() and np.all(other[0] < (1.0 - practical) * present[0])
                 and not any(not_determined(effect, trial.problem.kind)
                             for effect in trial.with_intervals(other[1]))):
             present, chosen = other, other[1]
