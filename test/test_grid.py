@@ -25,6 +25,8 @@ def test_half_of_the_nodes_follow_the_response():
     nodes = nodes_along(0.0, 10.0, inputs, response, trial, 20)
     assert np.all(np.diff(nodes) > 0.0)
     assert 10 <= np.count_nonzero((nodes > 3.999) & (nodes < 5.001)) <= 12
+    assert np.ptp(np.diff(nodes_along(
+        0.0, 10.0, inputs, response, trial, 20, following=0.0))) < 1e-9
     # Elsewhere they are half as dense as on an even grid.
     assert np.diff(nodes)[nodes[1:] < 3.9] == pytest.approx(1.0, abs=0.1)
 

@@ -45,13 +45,15 @@ class Excitation:
         Measured, for each input wanted.
     trial : ndarray of int, shape (n,)
         Trial of each of them.
+    following : float
+        Share of the grid's nodes that follow the response; see `nodes_along`.
     """
 
     def __init__(self, inputs: np.ndarray, ends: np.ndarray, wanted: np.ndarray,
-                 response: np.ndarray, trial: np.ndarray) -> None:
+                 response: np.ndarray, trial: np.ndarray, following: float) -> None:
         self.inputs = inputs
         self._ends, self._wanted = ends, wanted
-        self._response, self._trial = response, trial
+        self._response, self._trial, self._following = response, trial, following
         self._nodes: dict[int, np.ndarray] = {}
         self._shares: dict[int, np.ndarray] = {}
         self._smoothness: dict[int, sparse.csr_matrix] = {}
@@ -61,7 +63,7 @@ class Excitation:
         if levels not in self._nodes:
             self._nodes[levels] = nodes_along(
                 self.inputs.min(), self.inputs.max(), self.inputs[self._wanted], self._response,
-                self._trial, levels)
+                self._trial, levels, self._following)
         return self._nodes[levels]
 
     def smoothness(self, levels: int) -> sparse.csr_matrix:

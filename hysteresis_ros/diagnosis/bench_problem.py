@@ -24,6 +24,7 @@ from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench import left_out
+from hysteresis_ros.identification.grid import FOLLOWING
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
 from hysteresis_ros.identification.nonnegative import extrapolated, part_of
 from hysteresis_ros.identification.projection import ProjectedWeights
@@ -64,6 +65,9 @@ SAME_LOAD = 0.02
 # effect does to its width, and bend the effect's parameters. Of 48 benches 1 loses an effect of
 # the load on four; 2 names about the same as 1.5, and takes twice as long.
 JUDGED = 1.5
+# The same for muscles that do not transform: a pneumatic one goes its way evenly, so that its grid
+# is even, too.
+JUDGED_EVEN = 2.0
 
 
 @dataclasses.dataclass
@@ -102,6 +106,7 @@ class BenchProblem(Problem):
         self._wanted[self._judged + np.repeat(np.arange(1, len(counts) + 1), counts)[
             self._judged]] = True
         self._surroundings = model.surroundings
+        self._transforms = model.surroundings.drive != 'pressure'
         self._strength = SEARCH_STRENGTH
         self._forget()
 
@@ -117,7 +122,8 @@ class BenchProblem(Problem):
     def finer(self) -> BenchProblem:
         """Return the same rows with H2 on the grid on which sets of effects are judged."""
         other = copy.copy(self)
-        other.levels = round(JUDGED * self._levels_of_model)
+        other.levels = round(
+            (JUDGED if self._transforms else JUDGED_EVEN) * self._levels_of_model)
         other._forget()
         return other
 
@@ -232,7 +238,8 @@ class BenchProblem(Problem):
             if first.loaded and chain.plays:
                 given = follow(given, width[self._felt], self._ends)
             _remember(self._excitations, key, Excitation(
-                given, self._ends, self._wanted, self.measured, self.trial))
+                given, self._ends, self._wanted, self.measured, self.trial,
+                FOLLOWING if self._transforms else 0.0))
         return self._excitations[key]
 
     def _first(self, first: FirstStage, squared: np.ndarray) -> np.ndarray:
@@ -372,11 +379,16 @@ class BenchProblem(Problem):
         target = self.measured - design.known
         return (design.shares, target) if train is None else (design.shares[train], target[train])
 
-    @staticmethod
-    def _further(design: Design, train: np.ndarray | None) -> np.ndarray:
-        """Return by what share more each weight of a design is penalised; see `extrapolated`."""
+    def _further(self, design: Design, train: np.ndarray | None) -> np.ndarray:
+        """
+        Return by what share more each weight of a design is penalised; see `extrapolated`.
+
+        A transformation ends; a muscle that does not transform goes on as it did.
+        """
         shares = design.shares
-        return np.zeros(shares.shape[1]) if train is None else extrapolated(shares, train)
+        if train is None or not self._transforms:
+            return np.zeros(shares.shape[1])
+        return extrapolated(shares, train)
 
     def _projected(self, design: Design, train: np.ndarray | None) -> ProjectedWeights:
         # Neighbouring parameters have neighbouring weights.

@@ -9,12 +9,12 @@ from hysteresis_ros.measurements.way import way_below
 
 # The grid reaches at least this far beyond the inputs, as a share of their range.
 MARGIN = 1e-6
-# Share of the nodes that follow the response; the others lie evenly over the inputs.
+# Share of the nodes that follow the response of a muscle that transforms.
 FOLLOWING = 0.5
 
 
 def nodes_along(low: float, high: float, inputs: np.ndarray, response: np.ndarray,
-                trial: np.ndarray, levels: int) -> np.ndarray:
+                trial: np.ndarray, levels: int, following: float = FOLLOWING) -> np.ndarray:
     """
     Return nodes that lie densely where the response goes its way.
 
@@ -32,6 +32,8 @@ def nodes_along(low: float, high: float, inputs: np.ndarray, response: np.ndarra
         Trial of each of them.
     levels : int
         Number N of intervals.
+    following : float
+        Share of the nodes that follow the response; with 0 all intervals are equal.
 
     Returns
     -------
@@ -45,4 +47,4 @@ def nodes_along(low: float, high: float, inputs: np.ndarray, response: np.ndarra
     way = np.concatenate(([0.0], way_below(inputs, risen(inputs, response, trial))[order], [1.0]))
     even = (places - low) / (high - low)
     return np.interp(np.linspace(0.0, 1.0, levels + 1),
-                     FOLLOWING * way + (1.0 - FOLLOWING) * even, places)
+                     following * way + (1.0 - following) * even, places)
