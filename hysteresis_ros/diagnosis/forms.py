@@ -63,8 +63,7 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
     chosen = None
     if simplest:
         plain = fitted(simplest)
-        if not plain[1].implausible() and np.all(
-                plain[0] <= (1.0 + practical) * error):
+        if not plain[1].implausible() and np.all(plain[0] <= (1.0 + practical) * error):
             present, chosen = plain, plain[1]
     for forms in others:
         other = fitted({**simplest, **forms} if chosen is not None else forms)
