@@ -59,7 +59,7 @@ class Excitation:
         self._smoothness: dict[int, sparse.csr_matrix] = {}
 
     def nodes(self, levels: int) -> np.ndarray:
-        """Return a grid that is dense where the response goes its way, shape (levels + 1,)."""
+        """Return a grid that is dense where the response varies most, shape (levels + 1,)."""
         if levels not in self._nodes:
             self._nodes[levels] = nodes_along(
                 self.inputs.min(), self.inputs.max(), self.inputs[self._wanted], self._response,

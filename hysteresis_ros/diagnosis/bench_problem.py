@@ -65,8 +65,8 @@ SAME_LOAD = 0.02
 # effect does to its width, and bend the effect's parameters. Of 48 benches 1 loses an effect of
 # the load on four; 2 names about the same as 1.5, and takes twice as long.
 JUDGED = 1.5
-# The same for muscles that do not transform: a pneumatic one goes its way evenly, so that its grid
-# is even, too.
+# The same for muscles that do not transform: the response of a pneumatic one varies evenly with its
+# input, so that its grid is even, too.
 JUDGED_EVEN = 2.0
 
 

@@ -16,11 +16,12 @@ FOLLOWING = 0.5
 def nodes_along(low: float, high: float, inputs: np.ndarray, response: np.ndarray,
                 trial: np.ndarray, levels: int, following: float = FOLLOWING) -> np.ndarray:
     """
-    Return nodes that lie densely where the response goes its way.
+    Return nodes that are dense where the response varies most.
 
-    The weight jumps at nodes only. A wire that transforms within a tenth of its inputs has, of as
-    many intervals, five times as many there as on an even grid. What goes against the input is
-    noise, and no way.
+    Half of them divide the inputs evenly, half the total variation of the response over its
+    inputs. The weight jumps at nodes only: a wire that transforms within a tenth of its inputs has,
+    of as many intervals, five times as many there as on an even grid. What goes against the input
+    is noise, and does not count.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How far a response that rises with its input goes from row to row, its noise aside."""
+"""Variation from row to row of a response that rises with its input, without its noise."""
 
 import numpy as np
 

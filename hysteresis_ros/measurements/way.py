@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where along its drive a response goes its way."""
+"""Over which drives a response varies: its total variation, as a share of the whole."""
 
 import numpy as np
 
@@ -31,13 +31,13 @@ def way_done(drive: np.ndarray, response: np.ndarray, trial: np.ndarray) -> np.n
 
 def way_below(drive: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """
-    Return the share of a way that is done below each row's drive.
+    Return the share of a total variation that lies below each row's drive.
 
     Parameters
     ----------
     drive : ndarray, shape (n,)
     steps : ndarray, shape (n - 1,)
-        Way from each row to the next, not negative.
+        Variation from each row to the next, not negative.
 
     Returns
     -------
