@@ -17,6 +17,7 @@ from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import Effect
 
@@ -52,12 +53,24 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
     practical = Settings().practical
 
     def fitted(forms: Forms) -> tuple[np.ndarray, Fit]:
-        fit = trial.cross_validate(trial.fit(
-            [effect.with_values(**forms.get(effect.id, {})) for effect in free]))
+        # Values that suit one form may be where a fit of another one gets stuck.
+        anew = [usual([effect], 'bench')[0] if effect.id in forms else effect for effect in free]
+        fits = [trial.fit([effect.with_values(**forms.get(effect.id, {})) for effect in start])
+                for start in ([free, anew] if forms else [free])]
+        fit = trial.cross_validate(min(fits, key=lambda one: trial.error(one.predicted)))
         # To the error of all rows the least load contributes most, as the others are extrapolated
         # to it; to the typical one, by which sets are compared, all contribute alike.
         return np.array([trial.error(fit.held_out), significance.typical_error(
             trial.problem.squares(fit.held_out), trial.problem.small_error)]), fit
+
+    def better(other: tuple[np.ndarray, Fit], than: tuple[np.ndarray, Fit]) -> bool:
+        # As of sets: where rows held out tell two forms apart by less than what matters, the rows
+        # fitted do.
+        if np.all(other[0] < (1.0 - practical) * than[0]):
+            return True
+        own, its = (trial.error(fit.predicted) for _, fit in (other, than))
+        return bool(other[0][1] <= (1.0 + practical) * than[0][1]
+                    and own < (1.0 - practical) * its)
 
     present = error, _ = fitted({})
     chosen = None
@@ -67,7 +80,7 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
             present, chosen = plain, plain[1]
     for forms in others:
         other = fitted({**simplest, **forms} if chosen is not None else forms)
-        if (not other[1].implausible() and np.all(other[0] < (1.0 - practical) * present[0])
+        if (not other[1].implausible() and better(other, present)
                 and not any(not_determined(effect, trial.problem.kind)
                             for effect in trial.with_intervals(other[1]))):
             present, chosen = other, other[1]
