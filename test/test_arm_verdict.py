@@ -56,6 +56,18 @@ def test_a_single_row_that_is_wrong_is_named():
     assert (told.verdict, told.single_row) == ('unknown', None)
 
 
+def test_a_single_row_that_is_wrong_is_named_beside_an_effect():
+    """Where the effect changes more than the row, it is the effect's residual that shows it."""
+    model = bicep_model()
+    measured = recording(model, [effect_of(model, 'payload_error', dm=60.0)])
+    angle = measured.column('angle').copy()
+    angle[30] += 0.4
+    told = diagnose(model, [Measurement.from_columns({**measured.columns, 'angle': angle})],
+                    ['payload_error', 'frame_tilt'])
+    assert (told.verdict, told.explains_most) == ('unknown', ['payload_error'])
+    assert told.single_row == measured.time[29] + measured.time[30]
+
+
 @pytest.fixture(scope='module')
 def verdict():
     """Return the verdict on an arm that carries 15 g more."""

@@ -101,6 +101,19 @@ def test_nothing_is_named_where_nothing_is_hidden(model):
     check_json(found)
 
 
+def test_angles_shifted_after_the_recording_are_late(model):
+    """Before the first of a trial arrives they hold it, though the drive has moved by then."""
+    train, _ = recordings({}, 'arm-dynamic', (3,))
+    angle = train.column('angle').copy()
+    for _, part in train.split():
+        angle[part] = np.interp(train.time[part] - 0.6, train.time[part], angle[part])
+    shifted = Measurement.from_columns({**train.columns, 'angle': angle})
+    found = diagnose(model, [shifted], RIVALS, seed=SEED)
+    assert found.missing == ['latency'] and found.effects[0].held == 1.0
+    # Of the rows every sixth is judged, 0.6 s apart.
+    assert found.effects[0].delay == pytest.approx(0.6, abs=0.3)
+
+
 def test_a_heavier_payload_is_named_first_and_added(model):
     """With it the unseen recording is nearly as good as one without anything hidden."""
     train, test = recordings({'payload_error': 1.0})

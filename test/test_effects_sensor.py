@@ -76,6 +76,18 @@ def test_latency_shows_the_rest_before_a_trial_first():
     np.testing.assert_allclose(single, whole)
 
 
+def test_latency_of_a_recording_shifted_afterwards_holds_its_first_measurement():
+    """As `numpy.interp` does before the first time that it was given."""
+    late = effect('latency', delay=0.25, held=1.0)
+    late.start()
+    late.begin(3.0)
+    response, dt = np.array([1.0, 2.0, 4.0]), [0.1, 0.2, 0.2]
+    whole = late.forward(response, rows(dt))
+    np.testing.assert_allclose(whole, [1.0, 1.0, 1.75])
+    single = [late.step(value, each) for value, each in zip(response, dt)]
+    np.testing.assert_allclose(single, whole)
+
+
 @pytest.mark.parametrize('onset', [False, True])
 def test_the_rest_before_a_trial_is_measured_as_what_follows_it(onset):
     """Angles that arrive late are off by the offset from the first one on."""

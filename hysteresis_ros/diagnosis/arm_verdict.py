@@ -101,18 +101,25 @@ class _Verdict:
             experiment=verdict.next_experiment(
                 kind, to_add, [alternatives[name] for name in missing], unobservable),
             effects=effects, rmse_before=before, rmse_after=after, not_excited=unobservable,
-            event=happened, single_row=self._single_row() if unknown else None,
+            event=happened, single_row=self._single_row(best) if unknown else None,
             resembles=resembles, explains_most=explains_most,
             uneven=unknown and self.sets.uneven(chosen),
             signal=unexplained_signal(problem, problem.measured - self.sets.fits[
                 chosen].predicted) if unknown else '',
             kept_strain=kept)
 
-    def _single_row(self) -> float | None:
-        """Return the time [s] of the row that has more than half of the residual's square."""
-        squares = (self.problem.measured - self.sets.base.predicted) ** 2
-        row = int(np.argmax(squares))
-        return float(self.problem.clock[row]) if 2.0 * squares[row] > np.sum(squares) else None
+    def _single_row(self, best: frozenset[str]) -> float | None:
+        """
+        Return the time [s] of the row that has more than half of a residual's square.
+
+        Of the base model's residual, or of what the best set leaves.
+        """
+        for names in (frozenset(), best):
+            squares = (self.problem.measured - self.sets.fits[names].predicted) ** 2
+            row = int(np.argmax(squares))
+            if 2.0 * squares[row] > np.sum(squares):
+                return float(self.problem.clock[row])
+        return None
 
     def _in_order(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return effects, that first which explains most by itself."""

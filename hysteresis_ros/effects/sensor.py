@@ -130,7 +130,10 @@ class Latency(SensorEffect):
     needs_transients = True
     invertible = False
     parameters = (
-        Parameter('delay', 's', 'age of a measurement', 0.005, 5.0, 0.0, (0.1, 1.0), log=True),)
+        Parameter('delay', 's', 'age of a measurement', 0.005, 5.0, 0.0, (0.1, 1.0), log=True),
+        Parameter('held', '1', 'until the first measurement of a trial arrives, 0: the response '
+                  'before the trial is read, 1: that first measurement, as where a recording was '
+                  'shifted afterwards', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0)))
 
     memory = ('_past',)
 
@@ -159,7 +162,7 @@ class Latency(SensorEffect):
 
     def begin(self, rest: float) -> None:
         """See the state of rest until what follows it arrives."""
-        self._past = [[0.0, rest]]
+        self._past = [] if self.held else [[0.0, rest]]
 
     def step(self, value: float, dt: float) -> float:
         """Interpolate in what was seen within the delay."""
