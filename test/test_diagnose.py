@@ -19,6 +19,7 @@ from hysteresis_ros.diagnosis.extend import extend, rmse
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import MeasurementError, ParameterError
 from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.laboratory.conditions import Air, ROOM
 from hysteresis_ros.laboratory.experiments import experiment_tables
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.plant import Plant
@@ -112,6 +113,20 @@ def test_angles_shifted_after_the_recording_are_late(model):
     assert found.missing == ['latency'] and found.effects[0].held == 1.0
     # Of the rows every sixth is judged, 0.6 s apart.
     assert found.effects[0].delay == pytest.approx(0.6, abs=0.3)
+
+
+def test_a_room_that_is_heated_in_turns_drifts(model, monkeypatch):
+    """Up and down twice in two hours, as a thermometer would show that nobody has read."""
+    monkeypatch.setattr(Air, 'recorded', lambda air, time: ROOM + 0.5 * air.swing * math.sin(
+        2.0 * math.pi * time / air.period + air.phase))
+    train, test = recordings({'ambient_temperature': 1.0}, trials=range(4))
+    unread = [Measurement.from_columns({name: values for name, values in run.columns.items()
+                                        if name != 'ambient_temperature'})
+              for run in (train, test)]
+    found = diagnose(model, unread[:1], seed=SEED)
+    assert found.missing == ['ambient_drift'] and found.effects[0].sine != 0.0
+    assert found.effects[0].period == pytest.approx(0.45 * 7200.0, rel=0.1)
+    assert found.rmse_after < 0.3 * found.rmse_before
 
 
 def test_a_heavier_payload_is_named_first_and_added(model):

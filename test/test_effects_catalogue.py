@@ -9,6 +9,7 @@ import types
 import numpy as np
 import pytest
 
+from hysteresis_ros.diagnosis.parameters import ParameterVector
 from hysteresis_ros.effects import (
     catalogue, DriveEffect, Effect, effect_class, Inputs, MaterialEffect, Parameter, SensorEffect,
     STAGES)
@@ -85,7 +86,7 @@ RANGES = {
     ('thermal_lag', 'time_constant'): ('s', 0.03, 150.0),
     ('valve_lag', 'filling'): ('s', 0.03, 150.0), ('valve_lag', 'venting'): ('s', 0.03, 150.0),
     ('heat_loss', 'growth'): ('1', 0.05, 1.5),
-    ('heating_cooling_asymmetry', 'ratio'): ('1', 0.5, 2.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
+    ('heating_cooling_asymmetry', 'ratio'): ('1', 0.2, 5.0), ('airflow', 'beta'): ('1', 0.5, 3.0),
     ('viscoelastic_creep', 'J'): ('% of l0', 0.01, 2.0),
     ('creep', 'c'): ('% of l0', 0.01, 0.5), ('slack', 'Ls'): ('mm', 0.1, 5.0),
     ('series_compliance', 'compliance'): ('mm/N', 0.005, 0.65),
@@ -211,6 +212,19 @@ def test_a_small_rate_adds_up_in_a_long_recording():
     assert small.implausible(duration=7200.0) == ['rate', 'curvature']
     still = drift.with_values(rate=0.0, curvature=20.0)
     assert 'curvature' in still.implausible(duration=7200.0)
+
+
+def test_a_room_that_is_heated_in_turns_is_a_drift():
+    """Whatever its mean does; and what belongs to the wave is fitted only with it."""
+    drift = effect_of(bicep_model(), 'ambient_drift', offset=0.0, rate=0.0, curvature=0.0,
+                      sine=0.8, cosine=-0.6, period=1200.0)
+    assert drift.implausible(duration=3600.0) == []
+    assert drift.total(np.array([0.0, 300.0, 600.0, 1500.0])) == pytest.approx(
+        [-0.6, 0.8, 0.6, 0.8])
+    steady = drift.with_values(sine=0.0)
+    np.testing.assert_array_equal(steady.total(np.arange(5.0)), 0.0)
+    assert [len(ParameterVector([one], 'arm')) for one in (drift, steady)] == [6, 3]
+    assert 'total' in drift.with_values(sine=5.0).implausible(duration=3600.0)
 
 
 @pytest.mark.parametrize('values, duration, named', [

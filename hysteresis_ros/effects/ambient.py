@@ -61,8 +61,10 @@ class AmbientDrift(ThermalEffect):
 
     id = 'ambient_drift'
     sentence = 'The room slowly gets warmer or colder during the recording.'
-    equation = 'Vs^2 = V^2 + a + b (t/t1) + c (t/t1)^2, t the time of day, t1 = 10 min'
-    source = 'Eq. 2 of the paper with T0 a slow function of time'
+    equation = ('Vs^2 = V^2 + a + b (t/t1) + c (t/t1)^2 + s sin(2 pi t / P) + k cos(2 pi t / P), '
+                't the time of day, t1 = 10 min')
+    source = ('Eq. 2 of the paper with T0 a slow function of time; the waves are those of a room '
+              'that is heated or cooled in turns')
     shows_in = 'time of day'
     experiment = 'repeat the same loop every few minutes, or log the ambient temperature'
     confused_with = ('fatigue', 'creep')
@@ -74,10 +76,22 @@ class AmbientDrift(ThermalEffect):
         Parameter('rate', 'V^2/10 min', 'change of that', 0.05, 12.0, 0.0, (-1.0, 1.0),
                   both_signs=True, scale='drive squared'),
         Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.05, 8.0, 0.0, (0.0,),
-                  both_signs=True, scale='drive squared'),)
-    together = ('rate', 'curvature')
+                  both_signs=True, scale='drive squared'),
+        Parameter('sine', 'V^2', 'wave of it, by its sine', 0.05, 8.0, 0.0, (0.0,),
+                  both_signs=True, scale='drive squared', form=True),
+        Parameter('cosine', 'V^2', 'the same, by its cosine', 0.05, 8.0, 0.0, (0.0,),
+                  both_signs=True, scale='drive squared', with_form='sine'),
+        Parameter('period', 's', 'period of the wave', 60.0, 86400.0, 3600.0, (3600.0,), log=True,
+                  with_form='sine'))
+    together = ('rate', 'curvature', 'sine', 'cosine')
 
     CLOCK_UNIT = 600.0
+    # Size of a wave to start from, over the usual range: from a small one a fit finds a large one,
+    # not the other way round.
+    WAVE = 0.1
+    # How many slow waves a recording may hold to start from, and of faster ones those of which one
+    # is chosen by its residual. What comes and goes more often is no slow change.
+    SLOW, FASTER = (1.0, 1.6), np.arange(2.0, 6.01, 0.25)
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Add a slow function of the time since the recording began."""
@@ -86,12 +100,29 @@ class AmbientDrift(ThermalEffect):
     def total(self, clock: Values) -> Values:
         """Return what the air adds [V^2] at times since the recording began [s]."""
         t = clock / self.CLOCK_UNIT
-        return self.offset + self.rate * t + self.curvature * t * t
+        found = self.offset + self.rate * t + self.curvature * t * t
+        if self.sine:
+            turned = 2.0 * math.pi * clock / self.period
+            found = found + self.sine * np.sin(turned) + self.cosine * np.cos(turned)
+        return found
 
     def moments(self, residual: np.ndarray, clock: np.ndarray) -> list[dict[str, float]]:
-        """Return rates at which a room of half the usual range changes in the recording."""
-        half = 0.5 * self.parameters[0].high * self.CLOCK_UNIT / max(float(np.ptp(clock)), 1.0)
-        return [{'rate': -half}, {'rate': half}]
+        """Return rates at which a room of half the usual range changes, and small waves."""
+        largest, duration = self.parameters[0].high, max(float(np.ptp(clock)), 1.0)
+        half = 0.5 * largest * self.CLOCK_UNIT / duration
+        return [{'rate': -half}, {'rate': half},
+                *({'rate': 0.0, 'sine': self.WAVE * largest, 'period': duration / waves}
+                  for waves in (*self.SLOW, self._faster(residual, clock / duration)))]
+
+    def _faster(self, residual: np.ndarray, time: np.ndarray) -> float:
+        """Return of how many waves those are that explain most of a residual besides a bend."""
+        bend, errors = np.vander(time, 3), []
+        for waves in self.FASTER:
+            turned = 2.0 * math.pi * waves * time
+            columns = np.column_stack([bend, np.sin(turned), np.cos(turned)])
+            fitted = columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
+            errors.append(float(np.sum((residual - fitted) ** 2)))
+        return float(self.FASTER[int(np.argmin(errors))])
 
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
         """Name also the total, where no room is as warm or changes as much in a recording."""

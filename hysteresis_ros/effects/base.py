@@ -61,6 +61,8 @@ class Parameter:
     scale : str
         What of muscle or arm, a key of `SCALES`, range and starts are in proportion to; they are
         those of the paper's. They hold for any muscle if it is empty.
+    with_form : str
+        Name of the parameter of form without which this one does nothing; fitted only with it.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Parameter:
     limits: tuple[float, float] | None = None
     form: bool = False
     scale: str = ''
+    with_form: str = ''
 
     def of(self, surroundings: 'Surroundings | None') -> 'Parameter':
         """Return it with the unit, range and starts that suit a muscle; for none, as it is."""
