@@ -70,10 +70,11 @@ def test_a_sensor_without_a_memory_needs_no_state_of_rest():
         plain.controller().reference(1.7 - offset))
 
 
-@pytest.mark.parametrize('seat', [-1.0, 0.5, 1.0])
-def test_targets_are_reached_wherever_in_its_play_the_encoder_was_zeroed(seat):
+@pytest.mark.parametrize('seat, zeroed', [
+    (-1.0, 1.0), (0.5, 1.0), (1.0, 1.0), (-1.0, 0.0), (1.0, 0.0)])
+def test_targets_are_reached_wherever_in_its_play_the_encoder_was_zeroed(seat, zeroed):
     model = bicep_model()
-    play = effect_of(model, 'backlash', B=3.0, seat=seat)
+    play = effect_of(model, 'backlash', B=3.0, seat=seat, zeroed=zeroed)
     angles, _ = drive_arm(model.with_effects([play]), SOME)
     np.testing.assert_allclose(angles, SOME, rtol=0.0, atol=1e-6)
 

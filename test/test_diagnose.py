@@ -261,16 +261,18 @@ def test_two_degrees_of_white_noise_on_the_models_own_response_are_adequate(mode
         check_json(found)
 
 
-@pytest.mark.parametrize('seat', [-1.0, -0.9, 1.0])
-def test_a_play_is_one_wherever_in_it_the_encoder_was_zeroed(model, seat):
+@pytest.mark.parametrize('seat, zeroed', [(-1.0, 1.0), (-0.9, 1.0), (1.0, 1.0), (1.0, 0.0)])
+def test_a_play_is_one_wherever_in_it_the_encoder_was_zeroed(model, seat, zeroed):
     """A muscle that has cooled down has left it at one end; which one goes with the arm."""
     train, _ = recordings({})
-    played = model.with_effects([*model.effects, effect_of(model, 'backlash', B=4.0, seat=seat)])
+    played = model.with_effects([*model.effects, effect_of(
+        model, 'backlash', B=4.0, seat=seat, zeroed=zeroed)])
     rng = np.random.default_rng(4)
     found = diagnose(model, [with_noise(of_the_model(played, train), math.radians(0.1)
                                         * rng.standard_normal(train.rows))], seed=SEED)
     assert (found.verdict, found.missing) == ('missing', ['backlash'])
     assert found.effects[0].seat == pytest.approx(seat, abs=0.15)
+    assert found.effects[0].zeroed == zeroed
 
 
 @pytest.mark.parametrize('seed', range(3))

@@ -38,16 +38,22 @@ def test_backlash_stands_still_until_the_play_is_used_up():
     np.testing.assert_allclose(np.degrees(seen), [10.0, 10.0, 11.0, 11.0, 11.0, 8.0, 8.0, 8.5])
 
 
-@pytest.mark.parametrize('seat, seen', [
-    (0.0, [10.0, 10.0, 11.0, 9.0]), (1.0, [10.5, 10.5, 12.0, 10.0]),
-    (-1.0, [10.0, 9.0, 10.0, 8.0]), (0.5, [10.0, 10.0, 11.5, 9.5])])
-def test_an_encoder_zeroed_at_rest_may_lie_anywhere_in_its_play(seat, seen):
+@pytest.mark.parametrize('seat, zeroed, seen', [
+    (0.0, 1.0, [10.0, 10.0, 11.0, 9.0]), (1.0, 1.0, [10.5, 10.5, 12.0, 10.0]),
+    (-1.0, 1.0, [10.0, 9.0, 10.0, 8.0]), (0.5, 1.0, [10.0, 10.0, 11.5, 9.5]),
+    (0.0, 0.0, [10.0, 10.0, 11.0, 9.0]), (1.0, 0.0, [9.5, 9.5, 11.0, 9.0]),
+    (-1.0, 0.0, [11.0, 10.0, 11.0, 9.0])])
+def test_an_encoder_may_lie_anywhere_in_its_play_at_rest(seat, zeroed, seen):
     """Whichever way the arm came to rest, the first of its turns shows or is swallowed whole."""
-    made = effect('backlash', B=2.0, seat=seat)
+    made = effect('backlash', B=2.0, seat=seat, zeroed=zeroed)
     made.start()
     made.begin(math.radians(10.0))
-    found = made.forward(np.radians([10.5, 9.0, 12.0, 8.0]), rows(np.ones(4)))
+    turns = np.radians([10.5, 9.0, 12.0, 8.0])
+    found = made.forward(turns, rows(np.ones(4)))
     np.testing.assert_allclose(np.degrees(found), seen)
+    made.start()
+    made.begin(math.radians(10.0))
+    np.testing.assert_allclose([made.step(turn, 1.0) for turn in turns], found)
 
 
 @given(angles, st.sampled_from([-1.0, 0.0, 1.0]))

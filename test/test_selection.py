@@ -195,6 +195,19 @@ def test_one_effect_of_the_answer_is_exchanged_for_a_better_one(monkeypatch, fai
     assert found.sets.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
 
 
+def test_what_is_easily_taken_for_an_effect_of_the_answer_is_fitted_in_its_place(monkeypatch):
+    """However many others score better: a fan and a sag are named together."""
+    found, before = without_the_planted_pair()
+    monkeypatch.setattr(Selection, '_best_with', lambda *arguments: [])
+    fitted = []
+    fit = found.fitting.fit
+    monkeypatch.setattr(found.fitting, 'fit', lambda sets: fitted.extend(sets) or fit(sets))
+    found._exchange()
+    assert found.sets.fits[PLANTED].log_evidence == pytest.approx(before, abs=1.0)
+    names = [tuple(effect.id for effect in effects) for effects in fitted]
+    assert ('payload_error', 'supply_sag') in names and ('airflow', 'payload_error') not in names
+
+
 def test_of_what_changes_much_the_start_that_is_nearest_is_tried(model):
     """Where the wire hardly transforms any more, no derivative says what a larger value does."""
     hidden = [effect_of(model, 'pwm_dead_zone', Vd=1.2), effect_of(model, 'supply_sag', Rs=0.9)]

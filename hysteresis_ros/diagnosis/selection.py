@@ -28,7 +28,7 @@ from hysteresis_ros.diagnosis.linearised import (
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 from hysteresis_ros.diagnosis.set_fitter import BEGUN, FIRST_STEPS, SetFitter
-from hysteresis_ros.effects import Effect
+from hysteresis_ros.effects import catalogue, Effect
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -328,7 +328,8 @@ class Selection:
                     rest = dataclasses.replace(
                         fit, covariance=whole.covariance, values=whole.values)
                     singles = self._linearised_at(rest).singles()
-                    self.fitting.fit(self._best_with(kept, singles, out))
+                    self.fitting.fit([*self._best_with(kept, singles, out),
+                                      *self._confused_with(kept, singles, out)])
                     singles = singles_as_started(self.fitter, rest, self._others(rest))
                     self.fitting.begin(self._best_with(kept, singles, out), 1)
             self.fitting.refine(len(names))
@@ -340,8 +341,33 @@ class Selection:
         """Return what is kept with each of the best effects scored, but for the one named."""
         order = sorted((item for key, item in scored.items() if key != (out,)),
                        key=lambda item: -item[0])
-        return [[*(one for one in kept if one.id not in effects[0].replaces), *effects]
-                for _, effects in order[:self.settings.refits]]
+        return [self._with(kept, effects) for _, effects in order[:self.settings.refits]]
+
+    @staticmethod
+    def _with(kept: Sequence[Effect], effects: Sequence[Effect]) -> list[Effect]:
+        """Return what is kept with one effect more, which may replace some of it."""
+        return [*(one for one in kept if one.id not in effects[0].replaces), *effects]
+
+    def _confused_with(self, kept: Sequence[Effect],
+                       scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
+                       ) -> list[list[Effect]]:
+        """
+        Return what is kept with each effect that is easily taken for the one named.
+
+        If not among the best scored, which `_best_with` gives: of many that fit alike some would
+        not be compared at all.
+        """
+        best = {tuple(effect.id for effect in effects) for effects in
+                self._best_with(kept, scored, out)}
+        known = catalogue()
+
+        def confused(name: str) -> bool:
+            return name in known and out in known and (
+                out in known[name].confused_with or name in known[out].confused_with)
+        sets = [self._with(kept, effects) for key, (_, effects) in scored.items()
+                if key != (out,) and all(map(confused, key))]
+        return [effects for effects in sets
+                if tuple(effect.id for effect in effects) not in best]
 
     def _to_exchange(self) -> tuple[frozenset[str], list[str]]:
         """

@@ -25,8 +25,8 @@ class MeasuredSupply(ElectricalEffect):
     experiment = 'log the supply voltage while the battery runs down, or at two settings of it'
     confused_with = ('supply_sag', 'ambient_drift')
     needs_column = 'supply_voltage'
-    # A board's converter resolves 10 to 50 mV.
-    smallest_change = 0.2
+    # Two steps of a board's converter, which resolves 10 to 50 mV.
+    smallest_change = 0.1
     parameters = (
         # From one cell of a lithium battery to four lead batteries.
         Parameter('nominal', 'V', 'supply voltage Vn at which what is set arrives', 3.0, 60.0, 0.0,

@@ -44,15 +44,16 @@ class Backlash(SensorEffect):
     """
     Play between shaft and encoder.
 
-    The encoder is zeroed at the state of rest before a trial. Where in its play it lies there
-    depends on how the arm came to rest: a muscle that has cooled down has left it at one end.
+    Where in its play the encoder lies at the state of rest before a trial depends on how the arm
+    came to rest: a muscle that has cooled down has left it at one end. It may be zeroed there, or
+    have been in the middle of its play.
     """
 
     id = 'backlash'
     rowwise = True
     sentence = 'The encoder stands still until the play at its coupling is used up.'
-    equation = ('play operator of width B between shaft and encoder, zeroed at rest: theta_m is '
-                'from theta + (seat - 1) B / 2 to theta + (seat + 1) B / 2')
+    equation = ('play operator of width B between shaft and encoder: theta_m is from '
+                'theta + (zeroed seat - 1) B / 2 to theta + (zeroed seat + 1) B / 2')
     source = 'play operator'
     shows_in = 'reversals'
     experiment = 'move the arm by hand and watch the counts'
@@ -62,7 +63,9 @@ class Backlash(SensorEffect):
         Parameter('B', 'deg', 'width of the play', 0.2, 12.0, 0.0, (1.0, 4.0), log=True),
         Parameter('seat', '1', 'where in its play the encoder rests before a trial: 0 in the '
                   'middle, 1 where a turn to larger angles moves it at once, -1 one to smaller',
-                  -1.0, 1.0, 0.0, (0.0, 1.0, -1.0), limits=(-1.0, 1.0), form=True))
+                  -1.0, 1.0, 0.0, (0.0, 1.0, -1.0), limits=(-1.0, 1.0), form=True),
+        Parameter('zeroed', '1', '1: the encoder is zeroed at rest before a trial, 0: it was in '
+                  'the middle of its play', 0.0, 1.0, 1.0, (1.0,), choices=(1.0, 0.0)))
 
     memory = ('_state', '_target', '_lead')
 
@@ -71,14 +74,18 @@ class Backlash(SensorEffect):
     _target: float | None
 
     def start(self) -> None:
-        """Forget the past: the encoder is zeroed at the first sample, if not at a rest before."""
+        """Forget the past: the first sample is the state of rest, if none was before."""
         self._state = None
         self._target = None
         self._lead = 0.0
 
     def begin(self, rest: float) -> None:
-        """Zero the encoder at rest."""
-        self._state = rest
+        """Lay the encoder where it is at rest."""
+        self._state = self._at_rest(rest)
+
+    def _at_rest(self, rest: float) -> float:
+        """Return what the encoder shows at rest [rad]."""
+        return rest + self._middle - self.seat * self._half
 
     @property
     def _half(self) -> float:
@@ -87,18 +94,18 @@ class Backlash(SensorEffect):
     @property
     def _middle(self) -> float:
         """What the encoder shows more than the angle in the middle of its play [rad]."""
-        return self.seat * self._half
+        return self.zeroed * self.seat * self._half
 
     def step(self, value: float, dt: float) -> float:
         """Move the encoder only when the play is used up."""
-        state = value if self._state is None else self._state
+        state = self._at_rest(value) if self._state is None else self._state
         middle = value + self._middle
         self._state = min(max(state, middle - self._half), middle + self._half)
         return self._state
 
     def forward(self, response: np.ndarray, inputs: Inputs) -> np.ndarray:
         """Do what `step` does for a whole trial."""
-        place = response[0] if self._state is None else self._state
+        place = self._at_rest(response[0]) if self._state is None else self._state
         course = follow(np.ascontiguousarray(response + self._middle, float), self._half,
                         float(place))
         self._state = float(course[-1])
