@@ -58,17 +58,20 @@ class PwmDeadZone(ElectricalEffect):
 
     id = 'pwm_dead_zone'
     sentence = 'Below a smallest duty the board delivers nothing; above it the voltage is scaled.'
-    equation = 'Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd), Vmax the largest of the bench'
-    source = 'switching and dead time of a PWM stage'
+    equation = ('Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd), Vmax the largest of the bench; '
+                'or V - Vd where nothing makes up for it')
+    source = 'switching and dead time of a PWM stage; drop across its transistors'
     shows_in = 'low V'
     experiment = 'fine steps of the voltage near 0'
     confused_with = ('ambient_drift',)
     parameters = (
         Parameter('Vd', 'V', 'largest voltage that has no effect', 0.05, 1.5, 0.0, (0.3, 1.0),
-                  log=True, scale='drive'),)
+                  log=True, scale='drive'),
+        Parameter('scaled', '1', '1: the full voltage arrives, 0: it lacks Vd as all others do',
+                  0.0, 1.0, 1.0, (1.0,), choices=(1.0, 0.0)))
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
-        """Cut the lower end off and stretch the rest."""
+        """Cut the lower end off, and stretch the rest where it is scaled."""
         return np.maximum(signal - self.Vd, 0.0) * self._stretch(surroundings)
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
@@ -76,6 +79,8 @@ class PwmDeadZone(ElectricalEffect):
         return signal / self._stretch(surroundings) + self.Vd if signal > 0.0 else signal
 
     def _stretch(self, surroundings: Surroundings) -> float:
+        if not self.scaled:
+            return 1.0
         full = math.sqrt(surroundings.full_drive_squared)
         return full / max(full - self.Vd, 1e-3 * full)
 
@@ -86,8 +91,8 @@ class ResistanceChange(ElectricalEffect):
     id = 'resistance_change'
     sentence = ("The wire's resistance changes as it transforms, so the same voltage heats the "
                 'two phases differently.')
-    equation = ('Ve^2 = V^2 / (1 + eta xi), xi the martensite share: V^2 / R with '
-                'R = R_A (1 + eta xi), the hot wire as on the bench; the inverse for a current')
+    equation = ('Ve^2 = V^2 / (1 + eta (xi - xi0)), xi the martensite share: V^2 / R with R as on '
+                'the bench at xi0, 0 that of the hot wire; the inverse for a current')
     source = "the paper's reference [46]: less than 15 % in phase transition"
     shows_in = 'the middle of the loop'
     experiment = 'log the current as well as the voltage'
@@ -95,7 +100,9 @@ class ResistanceChange(ElectricalEffect):
     needs_phase = True
     parameters = (
         Parameter('eta', '1', 'resistance of martensite over that of austenite, less one',
-                  0.02, 0.20, 0.0, (-0.1, 0.1), both_signs=True),)
+                  0.02, 0.20, 0.0, (-0.1, 0.1), both_signs=True),
+        Parameter('xi0', '1', 'martensite share at which the resistance is that of the bench', 0.0,
+                  1.0, 0.0, (0.0, 0.5, 1.0), limits=(0.0, 1.0), form=True))
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Return the drive that heats a wire of constant resistance as much."""
@@ -106,5 +113,5 @@ class ResistanceChange(ElectricalEffect):
         return signal / float(self._gain(inputs, surroundings))
 
     def _gain(self, inputs: Inputs, surroundings: Surroundings) -> Values:
-        gain = 1.0 / np.sqrt(np.maximum(1.0 + self.eta * inputs.phase, 0.1))
+        gain = 1.0 / np.sqrt(np.maximum(1.0 + self.eta * (inputs.phase - self.xi0), 0.1))
         return gain if surroundings.drive == 'voltage' else 1.0 / gain
