@@ -86,7 +86,7 @@ def test_a_range_has_the_unit_of_the_drive(drive, square, plain):
     own = Surroundings(0.27, 3.0, 0.09, 0.02, drive=drive)
     gain = catalogue()['ambient_temperature'].describe(own)[0]
     assert gain.unit == square and gain.high == pytest.approx(2.0 * 0.09 / 36.0)
-    dead, = catalogue()['pwm_dead_zone'].describe(own)
+    dead = catalogue()['pwm_dead_zone'].describe(own)[0]
     assert dead.unit == plain and dead.high == pytest.approx(1.5 * 0.3 / 6.0)
 
 
