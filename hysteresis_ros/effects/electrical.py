@@ -58,8 +58,8 @@ class PwmDeadZone(ElectricalEffect):
 
     id = 'pwm_dead_zone'
     sentence = 'Below a smallest duty the board delivers nothing; above it the voltage is scaled.'
-    equation = ('Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd), Vmax the largest of the bench; '
-                'or V - Vd where nothing makes up for it')
+    equation = ('Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd), Vmax the largest of the '
+                'bench; or V - Vd where nothing makes up for it')
     source = 'switching and dead time of a PWM stage; drop across its transistors'
     shows_in = 'low V'
     experiment = 'fine steps of the voltage near 0'
