@@ -392,7 +392,7 @@ def test_what_the_bench_says_of_an_effect_is_one_of_its_starts():
     assert [start.effect.values for start in found if start.id == own.id].count(own.values) == 1
 
 
-def test_in_settled_rows_no_start_of_creep_frees_its_time():
+def test_in_settled_rows_only_creep_that_goes_on_frees_its_time():
     """That of the bench neither."""
     model = bicep_model(['creep'])
     fitter = fitter_of(model, noisy(model))
@@ -400,7 +400,8 @@ def test_in_settled_rows_no_start_of_creep_frees_its_time():
         fitter.problem.measured), 0)))
     found = linearised_starts(fitter, base, ['creep'])
     assert [start.effect.values for start in found].count(model.effects[0].values) >= 1
-    assert all(start.columns.shape[1] == 1 for start in found)
+    assert all(start.columns.shape[1] == (2 if start.effect.kept else 1) for start in found)
+    assert any(start.effect.kept for start in found)
 
 
 @pytest.mark.parametrize('name', ['end_stop', 'overload', 'encoder_eccentricity', 'heat_loss'])

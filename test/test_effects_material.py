@@ -281,6 +281,24 @@ def test_creep_that_is_kept_is_the_sum_over_all_steps():
         made.restore(made.save())
 
 
+@pytest.mark.parametrize('rested', [0.0, 1.0])
+def test_one_relaxation_follows_the_martensite(rested):
+    """Kelvin and Voigt: within a hold it nears the share of it, from all or from nothing."""
+    made = effect('creep', c=0.1, t0=90.0, kept=2.0, rested=rested)
+    trial = inputs(30.0 * np.arange(1, 5), phase=np.array([1.0, 0.4, 0.4, 0.9]))
+    offset, _ = made.drift(np.full(4, 4.0), np.full(4, 16.0), trial, WIRE)
+    relaxed, expected = 1.0 - rested, []
+    for phase in trial.phase:
+        relaxed = phase + (relaxed - phase) * math.exp(-30.0 / 90.0)
+        expected.append(0.001 * 0.27 * math.log(10.0) * (relaxed - 1.0 + rested))
+    np.testing.assert_allclose(offset, expected, atol=1e-15)
+    made.start()
+    for n in range(4):
+        row = Inputs(*(float(column[n]) for column in trial))
+        assert made.advance(4.0, 16.0, row, WIRE)[0] == pytest.approx(offset[n], abs=1e-15)
+        made.restore(made.save())
+
+
 def test_nothing_creeps_before_the_first_step_or_where_the_phase_is_not_known():
     made = effect('creep', c=0.1)
     offset, _ = made.drift(np.zeros(3), np.zeros(3), inputs([1, 9, 99], phase=[1, 1, 1]), WIRE)

@@ -67,6 +67,28 @@ def test_creep_by_another_law_is_creep(monkeypatch, form):
     assert found.rmse_after < 0.5 * found.rmse_before
 
 
+@pytest.mark.parametrize('rested', [True, False])
+def test_creep_that_outlasts_its_hold_is_creep(monkeypatch, rested):
+    """A relaxation of 90 s in holds of 30 s; the cold muscle may creep when a trial begins."""
+    begin_trial, crept = ParallelWires._begin, {}
+
+    def begin(self):
+        begin_trial(self)
+        crept[self] = 0.0 if rested else 1.0
+
+    def otherwise(self, voltage, dt):
+        share = self._share + (crept[self] - self._share) * math.exp(-dt / 90.0)
+        crept[self] = share
+        length = self._conditions.material.resting_length
+        self._creep = 0.004 * length * (share - (0.0 if rested else 1.0))
+    monkeypatch.setattr(ParallelWires, '_begin', begin)
+    monkeypatch.setattr(ParallelWires, '_creep_on', otherwise)
+    found = found_in({'creep': 1.0}, 5, protocol='arm-steps')
+    assert (found.verdict, found.missing) == ('missing', ['creep'])
+    assert found.effects[0].kept == 2.0 and found.effects[0].rested == rested
+    assert found.effects[0].t0 == pytest.approx(90.0, rel=0.2)
+
+
 @pytest.mark.parametrize('protocol', [
     'arm-steps', pytest.param('arm-dynamic', marks=pytest.mark.long)])
 def test_creep_that_is_as_large_after_a_small_step_is_creep(monkeypatch, protocol):

@@ -428,11 +428,14 @@ class Fitter:
             return fit
         white = self.covariance.white(max(self.error(fit.predicted), self.covariance.resolution))
         found, = self.fit([fit.effects], white) or [fit]
-        size = np.sqrt(np.maximum(np.diag(fit.spread), 1e-300))
-        wider = 1.0 + np.abs(found.vector - fit.vector) / (FACTOR * size)
+        # A form may have come out neutral, and is no longer free.
+        free = ParameterVector(fit.effects, self.problem.kind).free_still(found.effects)
+        spread = fit.spread[np.ix_(free, free)]
+        size = np.sqrt(np.maximum(np.diag(spread), 1e-300))
+        wider = 1.0 + np.abs(found.vector - fit.vector[free]) / (FACTOR * size)
         return dataclasses.replace(
             found, log_evidence=fit.log_evidence, values=fit.values,
-            spread=fit.spread * np.outer(wider, wider))
+            spread=spread * np.outer(wider, wider))
 
     def towards_least(self, fit: Fit) -> np.ndarray:
         """Return the response (n,), linearised, after one step towards the least squares."""

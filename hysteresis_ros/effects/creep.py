@@ -11,6 +11,9 @@ from hysteresis_ros.effects.stages import MaterialEffect
 from hysteresis_ros.kernels.creep import fade, relax
 from hysteresis_ros.kernels.trial import LONGEST_TRANSIENT
 
+# Value of `kept` for one relaxation.
+SINGLE = 2.0
+
 
 class Creep(MaterialEffect):
     """The muscle goes on moving in the direction of its last step."""
@@ -20,8 +23,10 @@ class Creep(MaterialEffect):
     equation = ('L += c l0 g(dxi) ln(1 + t / t0), t since the last step and dxi the change of the '
                 'martensite share by it, g(dxi) = dxi, or tanh(dxi / s) / tanh(1 / s); and that of '
                 'the steps before, which fades with exp(-2 t / t0); where kept is 1, the '
-                'logarithms of all steps so far')
-    source = "logarithmic creep of what has just transformed; Boltzmann's superposition (kept = 1)"
+                'logarithms of all steps so far, where it is 2, c l0 ln(10) y with '
+                'dy/dt = (xi - y) / t0, less those of the cold muscle if it is not rested')
+    source = ("logarithmic creep of what has just transformed; Boltzmann's superposition "
+              '(kept = 1); Kelvin and Voigt (kept = 2)')
     shows_in = 'log time in a hold'
     experiment = 'holds of 300 s'
     confused_with = ('thermal_lag', 'ambient_drift')
@@ -30,14 +35,16 @@ class Creep(MaterialEffect):
     parameters = (
         Parameter('c', '% of l0', 'strain per factor e of time after a full transformation', 0.01,
                   0.5, 0.0, (0.03, 0.15), log=True),
-        Parameter('t0', 's', 'time from which the logarithm counts', 0.005, 300.0, 3.0, (3.0,),
-                  log=True),
+        Parameter('t0', 's', 'time from which the logarithm counts, or time constant', 0.005,
+                  300.0, 3.0, (3.0,), log=True),
         Parameter('kept', '1', '0: a step lets the creep of those before fade, as in a '
-                  'transformation; 1: it goes on, as in a polymer', 0.0, 1.0, 0.0, (0.0, 1.0),
-                  choices=(0.0, 1.0)),
+                  'transformation; 1: it goes on, as in a polymer; 2: so does one relaxation', 0.0,
+                  2.0, 0.0, (0.0, 1.0), choices=(0.0, 1.0, 2.0), form=True),
         Parameter('s', '1', 'change of the martensite share by a step from which on a larger one '
                   'creeps hardly more; 0: in proportion to it', 0.0, 0.1, 0.0, (0.0, 0.1),
-                  choices=(0.0, 0.1)))
+                  choices=(0.0, 0.1)),
+        Parameter('rested', '1', 'of what goes on, 0: the cold muscle has crept before a trial, '
+                  '1: it begins to', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0), form=True))
 
     # When the last step was [s], and the drive before; None before a trial.
     _since: float | None
@@ -48,18 +55,29 @@ class Creep(MaterialEffect):
     # The logarithm as a sum of relaxations, each this many times slower than the one before.
     MODES, RATIO = 6, 3.0
 
+    # One relaxation comes to what the logarithm does in time that grows by this factor.
+    DECADE = 10.0
+
     # A change of the drive by less than this share of its range is a hold.
     HOLD = 1e-3
 
     # How much faster than t0 the strain of earlier steps fades.
     FADING = 2.0
 
+    # A slow relaxation [s].
+    SLOW = 60.0
+
     def start(self) -> None:
         """Forget the past: cold, before the first step."""
         self._since = self._drive = None
         self._phase = self._before = 1.0
         self._direction = self._crept = self._carried = 0.0
-        self._modes = [0.0] * self.MODES
+        self._modes = [-self.rested] * len(self._times())
+
+    def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
+        """Begin also with a relaxation that outlasts holds of half a minute, and with a rest."""
+        slow = {'c': 0.15, 't0': self.SLOW, 'kept': SINGLE}
+        return [slow, {**slow, 'rested': 1.0}, {'c': 0.15, 'kept': 1.0, 'rested': 1.0}]
 
     def advance(self, drive: float, drive_squared: float, inputs: Inputs,
                 surroundings: Surroundings) -> tuple[float, float]:
@@ -108,14 +126,16 @@ class Creep(MaterialEffect):
 
     def in_settled_rows(self) -> Effect:
         """
-        Return the effect with t0 as it is.
+        Return the effect with t0 as it is, but where it goes on: on an arm, whose holds differ.
 
         Of equal holds all that shows is what has crept at their ends.
         """
-        return self.with_parameter('t0', kinds=())
+        return self.with_parameter('t0', kinds=('arm',), with_form='kept')
 
     def _times(self) -> np.ndarray:
         """Return the time constant [s] of each relaxation, (modes,)."""
+        if self.kept == SINGLE:
+            return np.array([self.t0])
         # With this first time the sum comes to the logarithm, not beside it, in the long run.
         return 3.0 * self.t0 * self.RATIO ** np.arange(self.MODES)
 
@@ -138,7 +158,8 @@ class Creep(MaterialEffect):
         return self._strain_of_modes(total, surroundings)
 
     def _strain_of_modes(self, total: Values, surroundings: Surroundings) -> Values:
-        strain = self.c / 100.0 * math.log(self.RATIO) * total
+        each = math.log(self.DECADE if self.kept == SINGLE else self.RATIO)
+        strain = self.c / 100.0 * each * (total + self.rested * len(self._modes))
         return -surroundings.sign * surroundings.length * strain
 
     def _strain(self, change: Values, held: Values, surroundings: Surroundings) -> Values:
