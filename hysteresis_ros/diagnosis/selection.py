@@ -318,7 +318,10 @@ class Selection:
         """
         for _ in range(self.settings.most_effects):
             names, exchanged = self._to_exchange()
-            if len(names) < 2 or names in self._exchanged:
+            if names in self._exchanged or not names:
+                return
+            if len(names) == 1:
+                self._end_confused_with(names)
                 return
             self._exchanged.add(names)
             whole = self.sets.fits[names]
@@ -328,12 +331,30 @@ class Selection:
                     rest = dataclasses.replace(
                         fit, covariance=whole.covariance, values=whole.values)
                     singles = self._linearised_at(rest).singles()
-                    self.fitting.fit([*self._best_with(kept, singles, out),
-                                      *self._confused_with(kept, singles, out)])
+                    best = self._best_with(kept, singles, out)
+                    # Of many that fit alike some would not be compared at all.
+                    self.fitting.fit([*best, *(effects for effects in self._confused_with(
+                        kept, singles, out) if _names(effects) not in map(_names, best))])
                     singles = singles_as_started(self.fitter, rest, self._others(rest))
                     self.fitting.begin(self._best_with(kept, singles, out), 1)
             self.fitting.refine(len(names))
             self._refine_best()
+
+    def _end_confused_with(self, answer: frozenset[str]) -> None:
+        """
+        Fit to the end what is easily taken for an answer of one effect, and was only begun.
+
+        Also what is easily taken for others that could as well be the answer.
+        """
+        least = self.sets.log_posterior(answer) + math.log(self.settings.reported)
+        single, sets = self.alone.singles(), {}
+        for names in self.sets.valid():
+            if len(names) == 1 and self.sets.log_posterior(names) >= least:
+                for effects in self._confused_with([], single, *names):
+                    sets[_names(effects)] = effects
+        self.fitting.fit([effects for names, effects in sets.items()
+                          if self.sets.fits[names].covariance is None])
+        self._test_singles()
 
     def _best_with(self, kept: Sequence[Effect],
                    scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
@@ -351,23 +372,14 @@ class Selection:
     def _confused_with(self, kept: Sequence[Effect],
                        scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
                        ) -> list[list[Effect]]:
-        """
-        Return what is kept with each effect that is easily taken for the one named.
-
-        If not among the best scored, which `_best_with` gives: of many that fit alike some would
-        not be compared at all.
-        """
-        best = {tuple(effect.id for effect in effects) for effects in
-                self._best_with(kept, scored, out)}
+        """Return what is kept with each effect that is easily taken for the one named."""
         known = catalogue()
 
         def confused(name: str) -> bool:
             return name in known and out in known and (
                 out in known[name].confused_with or name in known[out].confused_with)
-        sets = [self._with(kept, effects) for key, (_, effects) in scored.items()
+        return [self._with(kept, effects) for key, (_, effects) in scored.items()
                 if key != (out,) and all(map(confused, key))]
-        return [effects for effects in sets
-                if tuple(effect.id for effect in effects) not in best]
 
     def _to_exchange(self) -> tuple[frozenset[str], list[str]]:
         """
@@ -383,3 +395,8 @@ class Selection:
         if implausible and len(best) > 1 and self.sets.sufficient(best):
             return best, sorted(implausible)
         return (answer, sorted(answer)) if self.sets.sufficient(answer) else (frozenset(), [])
+
+
+def _names(effects: Iterable[Effect]) -> frozenset[str]:
+    """Return the identifiers of effects."""
+    return frozenset(effect.id for effect in effects)

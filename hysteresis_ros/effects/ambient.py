@@ -56,6 +56,10 @@ class AmbientTemperature(ThermalEffect):
         return signal - self.gain * (inputs.ambient - self.reference)
 
 
+# Change of the drive squared in ten minutes [V^2] that no room exceeds in a few of them.
+FAST = 120.0
+
+
 class AmbientDrift(ThermalEffect):
     """The ambient temperature changes slowly and nobody recorded it."""
 
@@ -74,9 +78,9 @@ class AmbientDrift(ThermalEffect):
         Parameter('offset', 'V^2', 'what the air at the start adds against the bench', 0.0, 8.0,
                   0.0, (0.0,), both_signs=True, scale='drive squared'),
         Parameter('rate', 'V^2/10 min', 'change of that', 0.05, 12.0, 0.0, (-1.0, 1.0),
-                  both_signs=True, scale='drive squared'),
+                  both_signs=True, limits=(-FAST, FAST), scale='drive squared'),
         Parameter('curvature', 'V^2/(10 min)^2', 'bend of that change', 0.05, 8.0, 0.0, (0.0,),
-                  both_signs=True, scale='drive squared'),
+                  both_signs=True, limits=(-FAST, FAST), scale='drive squared'),
         Parameter('sine', 'V^2', 'wave of it, by its sine', 0.05, 8.0, 0.0, (0.0,),
                   both_signs=True, scale='drive squared', form=True),
         Parameter('cosine', 'V^2', 'the same, by its cosine', 0.05, 8.0, 0.0, (0.0,),
@@ -125,13 +129,20 @@ class AmbientDrift(ThermalEffect):
         return float(self.FASTER[int(np.argmin(errors))])
 
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
-        """Name also the total, where no room is as warm or changes as much in a recording."""
+        """
+        Name also the total, where no room is as warm or changes as much in a recording.
+
+        How fast it changes, and how soon that bends, is limited by that alone: a draught takes
+        minutes, the day's course hours.
+        """
         total = self._course(duration)
         size = max(float(np.max(np.abs(total))), float(np.ptp(total)))
         # No more than the air at the start: 20 K.
         offset = self.parameters[0]
-        return super().implausible(slack, duration) + (
-            ['total'] if size > offset.high * (1.0 + slack) else [])
+        fast = {one.name for one in self.parameters if one.name in ('rate', 'curvature')
+                and abs(self.values[one.name]) > one.high} if duration else set()
+        odd = [name for name in super().implausible(slack, duration) if name not in fast]
+        return odd + (['total'] if size > offset.high * (1.0 + slack) else [])
 
     def size_together(self, duration: float) -> float:
         """Return it with what a small rate adds up to in a long recording."""

@@ -99,7 +99,7 @@ class StressDependentStrain(MaterialEffect):
     sentence = 'The transformation strain grows with the load and saturates.'
     equation = ("S(F) = (1 - r s(F)) / (1 - r s(Fm)), s(F) = exp(-(F / F0)^n), Fm the bench's mean "
                 'load; on the arm alone: + growth (1 - s(F)) above the line, from no load where r '
-                'is known, else from Fm; the cold muscle at rest keeps its length')
+                'is known, else from Fm; the cold muscle at rest keeps its length, or the hot one')
     source = ('orientation of martensite variants under stress: exponential (n = 1) as H_cur of '
               'Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155, Gaussian (n = 2), or from '
               'a critical stress on (larger n) as of Brinson, J. Intell. Mater. Syst. Struct. 4 '
@@ -119,7 +119,10 @@ class StressDependentStrain(MaterialEffect):
                   0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',)),
         Parameter('n', '1', 'how late and abruptly it grows: 1 exponential, 2 Gaussian, 4 as from '
                   'a critical load on', 1.0, 4.0, 1.0, (1.0,), choices=(1.0, 2.0, 4.0),
-                  kinds=('bench',), form=True))
+                  kinds=('bench',), form=True),
+        Parameter('hot', '1', 'with a growth, 0: the cold muscle at rest is as long as on the '
+                  'bench, 1: the hot one is', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0),
+                  kinds=('arm',)))
 
     def scale(self, load: Values, surroundings: Surroundings) -> Values:
         """Grow with the load, one at the bench's mean load."""
@@ -132,7 +135,9 @@ class StressDependentStrain(MaterialEffect):
         return (1.0 - self.r * self._missing(load, surroundings)) / self._at_mean()
 
     def stretch(self, load: Values, surroundings: Surroundings) -> Values:
-        """Return what keeps the cold muscle's resting length, whatever the growth."""
+        """Return what keeps the cold muscle's resting length, whatever the growth, if anything."""
+        if self.hot:
+            return 0.0 * load
         on_bench, growth = self._shares(np.float64(surroundings.rest_load), surroundings)
         return 0.0 * load + float(growth / max(on_bench, 0.02)) * surroundings.least
 
