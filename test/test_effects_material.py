@@ -281,6 +281,16 @@ def test_creep_that_is_kept_is_the_sum_over_all_steps():
         made.restore(made.save())
 
 
+def test_a_growing_strain_keeps_the_length_of_the_cold_muscle_or_of_the_hot_one():
+    """On the arm; what is longer when cold is what a larger transformation strain says."""
+    around = WIRE._replace(rest_load=0.6, least=-0.012)
+    cold, hot = (effect('stress_dependent_strain', around, growth=0.2, hot=value)
+                 for value in (0.0, 1.0))
+    np.testing.assert_array_equal(cold.scale(LOADS, around), hot.scale(LOADS, around))
+    assert np.all(hot.stretch(LOADS, around) == 0.0)
+    assert np.all(cold.stretch(LOADS, around) != 0.0)
+
+
 @pytest.mark.parametrize('rested', [0.0, 1.0])
 def test_one_relaxation_follows_the_martensite(rested):
     """Kelvin and Voigt: within a hold it nears the share of it, from all or from nothing."""
