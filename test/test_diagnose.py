@@ -204,19 +204,6 @@ def test_lags_at_the_ends_of_their_range_are_found(tau, dt, hold):
     assert found.effects[0].time_constant == pytest.approx(tau, rel=0.03)
 
 
-def test_a_voltage_that_a_stage_takes_off_whatever_is_set_is_a_dead_zone(model):
-    """As the drop across a transistor, for which no larger duty makes up."""
-    plant, rng, trials = Plant(SEED, {}), np.random.default_rng(SEED), []
-    for trial in range(3):
-        set_to = np.round(rng.uniform(0.0, 6.0, 60), 3)
-        run = plant.arm_trial(np.maximum(set_to - 0.5, 0.0))
-        trials.append({**run, 'voltage': set_to, 'trial': np.full(60, trial)})
-    found = diagnose(model, [Measurement.from_columns({
-        name: np.concatenate([run[name] for run in trials]) for name in trials[0]})], seed=SEED)
-    assert found.missing == ['pwm_dead_zone'] and found.effects[0].scaled == 0.0
-    assert found.effects[0].Vd == pytest.approx(0.5, abs=0.05)
-
-
 def test_what_no_catalogue_has_is_called_unknown(model):
     """A bench shaken by a machine: no name is forced on it."""
     train, _ = recordings({'unlisted_shaken_bench': 1.0})

@@ -58,20 +58,17 @@ class PwmDeadZone(ElectricalEffect):
 
     id = 'pwm_dead_zone'
     sentence = 'Below a smallest duty the board delivers nothing; above it the voltage is scaled.'
-    equation = ('Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd), Vmax the largest of the '
-                'bench; or V - Vd where nothing makes up for it')
-    source = 'switching and dead time of a PWM stage; drop across its transistors'
+    equation = 'Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd), Vmax the largest of the bench'
+    source = 'switching and dead time of a PWM stage'
     shows_in = 'low V'
     experiment = 'fine steps of the voltage near 0'
     confused_with = ('ambient_drift',)
     parameters = (
         Parameter('Vd', 'V', 'largest voltage that has no effect', 0.05, 1.5, 0.0, (0.3, 1.0),
-                  log=True, scale='drive'),
-        Parameter('scaled', '1', '1: the full voltage arrives, 0: it lacks Vd as all others do',
-                  0.0, 1.0, 1.0, (1.0,), choices=(1.0, 0.0)))
+                  log=True, scale='drive'),)
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
-        """Cut the lower end off, and stretch the rest where it is scaled."""
+        """Cut the lower end off and stretch the rest."""
         return np.maximum(signal - self.Vd, 0.0) * self._stretch(surroundings)
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
@@ -79,8 +76,6 @@ class PwmDeadZone(ElectricalEffect):
         return signal / self._stretch(surroundings) + self.Vd if signal > 0.0 else signal
 
     def _stretch(self, surroundings: Surroundings) -> float:
-        if not self.scaled:
-            return 1.0
         full = math.sqrt(surroundings.full_drive_squared)
         return full / max(full - self.Vd, 1e-3 * full)
 
