@@ -56,7 +56,7 @@ class AmbientTemperature(ThermalEffect):
         return signal - self.gain * (inputs.ambient - self.reference)
 
 
-# Change of the drive squared in ten minutes [V^2] that no room exceeds in a few of them.
+# Largest change of the drive squared in ten minutes that is tried [V^2]: that of 20 K in 40 s.
 FAST = 120.0
 
 
