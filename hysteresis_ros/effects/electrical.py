@@ -97,7 +97,7 @@ class ResistanceChange(ElectricalEffect):
         Parameter('eta', '1', 'resistance of martensite over that of austenite, less one',
                   0.02, 0.20, 0.0, (-0.1, 0.1), both_signs=True),
         Parameter('xi0', '1', 'martensite share at which the resistance is that of the bench', 0.0,
-                  1.0, 0.0, (0.0, 0.5, 1.0), limits=(0.0, 1.0), form=True))
+                  1.0, 0.0, (0.0,), choices=(0.0, 0.5, 1.0)))
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Return the drive that heats a wire of constant resistance as much."""
