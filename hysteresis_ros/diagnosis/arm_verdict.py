@@ -251,14 +251,23 @@ class _Verdict:
         return [name for name in names if not shows[name]]
 
     def _strongest(self, effect: Effect) -> list[Effect]:
-        """Return an effect with all parameters at the upper ends of their ranges."""
+        """Return an effect with all parameters at the upper ends of their ranges, in one form."""
         return [effect.with_values(**{
-            parameter.name: parameter.choices[-1] if parameter.choices else parameter.high
+            parameter.name: (parameter.high if not parameter.choices else parameter.neutral
+                             if parameter.neutral in parameter.choices else parameter.choices[-1])
             for parameter in effect.parameters if self.problem.kind in parameter.kinds})]
 
     def _started(self, effect: Effect) -> list[Effect]:
-        """Return an effect where a fit may start, as it is and with the largest first parameter."""
-        first, starts = effect.parameters[0], self.selection.starts_of(effect, self.sets.base)
+        """
+        Return an effect where a fit may start, as it is and with the largest first parameter.
+
+        In the simplest of its forms: another one of a play moves an arm at rest, which shows none.
+        """
+        first = effect.parameters[0]
+        simplest = {parameter.name: parameter.neutral for parameter in effect.parameters
+                    if parameter.neutral in parameter.choices}
+        starts = [start for start in self.selection.starts_of(effect, self.sets.base)
+                  if simplest.items() <= start.values.items()]
         return [*starts, *(start.with_values(**{first.name: first.high}) for start in starts)]
 
     def _ranking(self, missing: Sequence[str], before: float) -> list[dict[str, Any]]:

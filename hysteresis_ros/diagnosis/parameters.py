@@ -149,7 +149,10 @@ def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
     guesses = [] if measured is None else effect.guesses(measured)
     if residual is not None and clock is not None:
         guesses = [*guesses, *effect.moments(residual, clock)]
-    return starts + [starts[0].with_values(**guess) for guess in guesses]
+    # A guess of what this kind of measurement does not show is none.
+    names = {parameter.name for parameter in fitted}
+    return starts + [starts[0].with_values(**guess) for guess in guesses
+                     if names.issuperset(guess)]
 
 
 def usual(effects: Sequence[Effect], kind: str) -> list[Effect]:

@@ -44,7 +44,8 @@ class Creep(MaterialEffect):
                   'creeps hardly more; 0: in proportion to it', 0.0, 0.1, 0.0, (0.0, 0.1),
                   choices=(0.0, 0.1)),
         Parameter('rested', '1', 'of what goes on, 0: the cold muscle has crept before a trial, '
-                  '1: it begins to', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0), form=True))
+                  '1: it begins to', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0), kinds=('arm',),
+                  form=True))
 
     # When the last step was [s], and the drive before; None before a trial.
     _since: float | None
@@ -77,7 +78,8 @@ class Creep(MaterialEffect):
     def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
         """Begin also with a relaxation that outlasts holds of half a minute, and with a rest."""
         slow = {'c': 0.15, 't0': self.SLOW, 'kept': SINGLE}
-        return [slow, {**slow, 'rested': 1.0}, {'c': 0.15, 'kept': 1.0, 'rested': 1.0}]
+        return [{**slow, 'rested': 0.0}, {**slow, 'rested': 1.0},
+                {'c': 0.15, 'kept': 1.0, 'rested': 1.0}]
 
     def advance(self, drive: float, drive_squared: float, inputs: Inputs,
                 surroundings: Surroundings) -> tuple[float, float]:
