@@ -3,13 +3,14 @@
 """Fits of effects to measured rows: their parameters, their starts, and what is held out."""
 
 import dataclasses
+import math
 
 from hypothesis import given, strategies as st
 from model_support import bicep_model, effect_of, runs, STRENGTHS
 import numpy as np
 import pytest
 
-from hysteresis_ros.diagnosis.arm_fit import _Walk, Fit, Fitter
+from hysteresis_ros.diagnosis.arm_fit import _Walk, FACTOR, Fit, Fitter
 from hysteresis_ros.diagnosis.covariance import Covariance
 from hysteresis_ros.diagnosis.discrepancy import Discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -390,6 +391,21 @@ def test_what_the_bench_says_of_an_effect_is_one_of_its_starts():
         fitter.problem.measured), 0)))
     found = linearised_starts(fitter, base, ['series_compliance', 'payload_error'])
     assert [start.effect.values for start in found if start.id == own.id].count(own.values) == 1
+
+
+def test_a_form_that_least_squares_finds_neutral_is_no_longer_free(monkeypatch):
+    """Its interval goes, and those of the others are as wide as both fits ask for."""
+    model = bicep_model()
+    sticking = effect_of(model, 'coulomb_friction', rest=0.3)
+    fitter = fitter_of(model, noisy(model, [sticking]))
+    point = fitter.covariance.points[0]
+    fit, = fitter.fit([[sticking]], point)
+    sliding, = fitter.fit([[fit.effects[0].with_values(rest=0.0)]], point)
+    monkeypatch.setattr(fitter, 'fit', lambda *arguments: [sliding])
+    found = fitter.least_squares(fit)
+    assert (fit.spread.shape, found.spread.shape) == ((2, 2), (1, 1))
+    away = abs(sliding.vector[0] - fit.vector[0]) / (FACTOR * math.sqrt(fit.spread[0, 0]))
+    assert found.spread[0, 0] == pytest.approx((1.0 + away) ** 2 * fit.spread[0, 0])
 
 
 def test_in_settled_rows_only_creep_that_goes_on_frees_its_time():

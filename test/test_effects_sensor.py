@@ -71,25 +71,15 @@ def test_latency_gives_what_was_a_moment_ago():
     np.testing.assert_allclose(seen, [1.0, 1.0, 1.75, 3.5])
 
 
-def test_latency_shows_the_rest_before_a_trial_first():
-    late = effect('latency', delay=0.25)
+@pytest.mark.parametrize('held, seen', [(0.0, [3.0, 2.0, 1.75]), (1.0, [1.0, 1.0, 1.75])])
+def test_latency_shows_the_rest_before_a_trial_first_or_holds_the_first_response(held, seen):
+    """The latter as `numpy.interp` does before the first time that it was given."""
+    late = effect('latency', delay=0.25, held=held)
     late.start()
     late.begin(3.0)
     response, dt = np.array([1.0, 2.0, 4.0]), [0.1, 0.2, 0.2]
     whole = late.forward(response, rows(dt))
-    np.testing.assert_allclose(whole, [3.0, 2.0, 1.75])
-    single = [late.step(value, each) for value, each in zip(response, dt)]
-    np.testing.assert_allclose(single, whole)
-
-
-def test_latency_of_a_recording_shifted_afterwards_holds_its_first_measurement():
-    """As `numpy.interp` does before the first time that it was given."""
-    late = effect('latency', delay=0.25, held=1.0)
-    late.start()
-    late.begin(3.0)
-    response, dt = np.array([1.0, 2.0, 4.0]), [0.1, 0.2, 0.2]
-    whole = late.forward(response, rows(dt))
-    np.testing.assert_allclose(whole, [1.0, 1.0, 1.75])
+    np.testing.assert_allclose(whole, seen)
     single = [late.step(value, each) for value, each in zip(response, dt)]
     np.testing.assert_allclose(single, whole)
 

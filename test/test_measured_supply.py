@@ -98,6 +98,13 @@ def test_it_is_named_where_the_recorded_supply_counts(nominal):
     assert found.effects[0].nominal == pytest.approx(nominal, rel=0.02)
 
 
+@pytest.mark.parametrize('change, shows', [(0.05, False), (0.15, True)])
+def test_a_supply_that_changes_by_two_steps_of_a_converter_is_looked_at(change, shows):
+    run = with_supply(runs(PLAIN, trials=4, rows=30, seed=4), np.linspace(12.0, 12.0 - change, 120))
+    names, _ = observable(problem_for(PLAIN, [run], ['measured_supply', 'supply_sag']))
+    assert ('measured_supply' in names) == shows
+
+
 def test_a_supply_that_changes_without_effect_is_not_named():
     run = with_supply(runs(PLAIN, trials=4, rows=30, seed=4), np.linspace(12.6, 10.0, 120))
     found = diagnose(PLAIN, [run], ['measured_supply', 'supply_sag', 'payload_error'])

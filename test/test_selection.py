@@ -223,6 +223,10 @@ def test_what_could_as_well_be_the_answer_is_fitted_to_the_end(model):
     assert sag in found.sets.valid()
     assert found.sets.fits[fan].log_evidence == pytest.approx(best, abs=0.5)
     assert found.sets.fits[play].covariance is None
+    # Nor need it have been begun.
+    del found.sets.fits[fan]
+    found._exchange()
+    assert found.sets.fits[fan].log_evidence == pytest.approx(best, abs=0.5)
 
 
 def test_of_what_changes_much_the_start_that_is_nearest_is_tried(model):

@@ -112,7 +112,7 @@ class _Verdict:
         """
         Return the time [s] of the row that has more than half of a residual's square.
 
-        Of the base model's residual, or of what the best set leaves.
+        Of the base model's residual, or of that of the best set.
         """
         for names in (frozenset(), best):
             squares = (self.problem.measured - self.sets.fits[names].predicted) ** 2
@@ -251,21 +251,14 @@ class _Verdict:
         return [name for name in names if not shows[name]]
 
     def _strongest(self, effect: Effect) -> list[Effect]:
-        """Return an effect with all parameters at the upper ends of their ranges, in one form."""
-        return [effect.with_values(**{
-            parameter.name: (parameter.high if not parameter.choices else parameter.neutral
-                             if parameter.neutral in parameter.choices else parameter.choices[-1])
-            for parameter in effect.parameters if self.problem.kind in parameter.kinds})]
+        """Return an effect with all parameters at the upper ends of their ranges."""
+        ends = {parameter.name: parameter.choices[-1] if parameter.choices else parameter.high
+                for parameter in effect.parameters if self.problem.kind in parameter.kinds}
+        return [effect.with_values(**{**ends, **_simplest(effect)})]
 
     def _started(self, effect: Effect) -> list[Effect]:
-        """
-        Return an effect where a fit may start, as it is and with the largest first parameter.
-
-        In the simplest of its forms: another one of a play moves an arm at rest, which shows none.
-        """
-        first = effect.parameters[0]
-        simplest = {parameter.name: parameter.neutral for parameter in effect.parameters
-                    if parameter.neutral in parameter.choices}
+        """Return an effect where a fit may start, as it is and with the largest first parameter."""
+        first, simplest = effect.parameters[0], _simplest(effect)
         starts = [start for start in self.selection.starts_of(effect, self.sets.base)
                   if simplest.items() <= start.values.items()]
         return [*starts, *(start.with_values(**{first.name: first.high}) for start in starts)]
@@ -288,3 +281,14 @@ class _Verdict:
             rows, np.stack([fit.predicted - self.sets.base.predicted for fit in alone]),
             problem.weight_columns(selection.fixed))
         return verdict.in_order(rows, missing)
+
+
+def _simplest(effect: Effect) -> dict[str, float]:
+    """
+    Return by name the neutral values of parameters that may be chosen neutral.
+
+    What could not have shown is said of these: other forms, as a play that is zeroed in its middle,
+    move an arm at rest, which does not show the effect.
+    """
+    return {parameter.name: parameter.neutral for parameter in effect.parameters
+            if parameter.neutral in parameter.choices}

@@ -28,7 +28,7 @@ from hysteresis_ros.diagnosis.linearised import (
 from hysteresis_ros.diagnosis.observable import observable, unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 from hysteresis_ros.diagnosis.set_fitter import BEGUN, FIRST_STEPS, SetFitter
-from hysteresis_ros.effects import catalogue, Effect
+from hysteresis_ros.effects import Effect
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -214,9 +214,8 @@ class Selection:
         self._grown.add(names)
         fit = self.sets.fits[names]
         found = self._linearised_with(names).singles()
-        self.fitting.fit_best({key: (value, [
-            *(one for one in fit.effects if one.id not in effects[0].replaces), *effects])
-            for key, (value, effects) in found.items()})
+        self.fitting.fit_best({key: (value, _with(fit.effects, effects))
+                               for key, (value, effects) in found.items()})
 
     def add(self, fit: Fit, effect: Effect) -> Fit:
         """
@@ -325,18 +324,18 @@ class Selection:
                 return
             self._exchanged.add(names)
             whole = self.sets.fits[names]
-            for out in exchanged:
-                kept = [effect for effect in whole.effects if effect.id != out]
-                for fit in self.fitter.fit([kept], self.fitting.metric, 0):
+            for out in (effect for effect in whole.effects if effect.id in exchanged):
+                others = [effect for effect in whole.effects if effect is not out]
+                for fit in self.fitter.fit([others], self.fitting.metric, 0):
                     rest = dataclasses.replace(
                         fit, covariance=whole.covariance, values=whole.values)
                     singles = self._linearised_at(rest).singles()
-                    best = self._best_with(kept, singles, out)
+                    best = self._best_with(others, singles, out.id)
                     # Of many that fit alike some would not be compared at all.
                     self.fitting.fit([*best, *(effects for effects in self._confused_with(
-                        kept, singles, out) if _names(effects) not in map(_names, best))])
+                        others, singles, out) if _names(effects) not in map(_names, best))])
                     singles = singles_as_started(self.fitter, rest, self._others(rest))
-                    self.fitting.begin(self._best_with(kept, singles, out), 1)
+                    self.fitting.begin(self._best_with(others, singles, out.id), 1)
             self.fitting.refine(len(names))
             self._refine_best()
 
@@ -344,42 +343,33 @@ class Selection:
         """
         Fit to the end what is easily taken for an answer of one effect, and was only begun.
 
-        Also what is easily taken for others that could as well be the answer.
+        Also what is easily taken for other single effects that could as well be the answer.
         """
         least = self.sets.log_posterior(answer) + math.log(self.settings.reported)
-        single, sets = self.alone.singles(), {}
+        singles, sets = self.alone.singles(), {}
         for names in self.sets.valid():
             if len(names) == 1 and self.sets.log_posterior(names) >= least:
-                for effects in self._confused_with([], single, *names):
+                for effects in self._confused_with([], singles, *self.sets.fits[names].effects):
                     sets[_names(effects)] = effects
-        self.fitting.fit([effects for names, effects in sets.items()
-                          if self.sets.fits[names].covariance is None])
+        # One that could not be begun may be fitted from another start.
+        self.fitting.fit([effects for names, effects in sets.items() if (
+            names not in self.sets.fits or self.sets.fits[names].covariance is None)])
         self._test_singles()
 
-    def _best_with(self, kept: Sequence[Effect],
+    def _best_with(self, others: Sequence[Effect],
                    scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
                    ) -> list[list[Effect]]:
-        """Return what is kept with each of the best effects scored, but for the one named."""
+        """Return other effects with each of the best ones scored, but for the one named."""
         order = sorted((item for key, item in scored.items() if key != (out,)),
                        key=lambda item: -item[0])
-        return [self._with(kept, effects) for _, effects in order[:self.settings.refits]]
+        return [_with(others, effects) for _, effects in order[:self.settings.refits]]
 
-    @staticmethod
-    def _with(kept: Sequence[Effect], effects: Sequence[Effect]) -> list[Effect]:
-        """Return what is kept with one effect more, which may replace some of it."""
-        return [*(one for one in kept if one.id not in effects[0].replaces), *effects]
-
-    def _confused_with(self, kept: Sequence[Effect],
-                       scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
+    def _confused_with(self, others: Sequence[Effect],
+                       scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: Effect
                        ) -> list[list[Effect]]:
-        """Return what is kept with each effect that is easily taken for the one named."""
-        known = catalogue()
-
-        def confused(name: str) -> bool:
-            return name in known and out in known and (
-                out in known[name].confused_with or name in known[out].confused_with)
-        return [self._with(kept, effects) for key, (_, effects) in scored.items()
-                if key != (out,) and all(map(confused, key))]
+        """Return other effects with each one scored that is easily taken for that given."""
+        return [_with(others, effects) for (name,), (_, effects) in scored.items()
+                if name in out.confused_with or out.id in effects[0].confused_with]
 
     def _to_exchange(self) -> tuple[frozenset[str], list[str]]:
         """
@@ -395,6 +385,11 @@ class Selection:
         if implausible and len(best) > 1 and self.sets.sufficient(best):
             return best, sorted(implausible)
         return (answer, sorted(answer)) if self.sets.sufficient(answer) else (frozenset(), [])
+
+
+def _with(others: Sequence[Effect], effects: Sequence[Effect]) -> list[Effect]:
+    """Return effects with one more, which may replace some of them."""
+    return [*(one for one in others if one.id not in effects[0].replaces), *effects]
 
 
 def _names(effects: Iterable[Effect]) -> frozenset[str]:

@@ -67,7 +67,7 @@ class Diagnosis(Result):
         Signal in which an unexplained residual shows.
     single_row : float or None
         Time [s], as `event`, of the one row that has more than half of an unexplained residual's
-        square, or of what the best set leaves of it: a reading that is wrong.
+        square, or of that of the best set's residual: a reading that is wrong.
     uneven : bool
         Whether an unexplained residual is like noise, but larger at some times than at others.
     resembles : list of str
