@@ -401,6 +401,7 @@ def test_a_form_that_least_squares_finds_neutral_is_no_longer_free(monkeypatch):
     point = fitter.covariance.points[0]
     fit, = fitter.fit([[sticking]], point)
     sliding, = fitter.fit([[fit.effects[0].with_values(rest=0.0)]], point)
+    sliding = dataclasses.replace(sliding, vector=sliding.vector + 0.2)
     monkeypatch.setattr(fitter, 'fit', lambda *arguments: [sliding])
     found = fitter.least_squares(fit)
     assert (fit.spread.shape, found.spread.shape) == ((2, 2), (1, 1))

@@ -229,6 +229,35 @@ def test_what_could_as_well_be_the_answer_is_fitted_to_the_end(model):
     assert found.sets.fits[fan].log_evidence == pytest.approx(best, abs=0.5)
 
 
+def test_either_of_two_effects_may_say_that_it_is_confused_with_the_other(model):
+    """A payload says so of the sag, which says so of the fan alone."""
+    names = ('payload_error', 'supply_sag', 'airflow', 'encoder_offset')
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]), names)
+    scored = found.alone.singles()
+
+    def confused(name):
+        effect, = found.sets.fits[frozenset([name])].effects
+        return {effects[0].id for effects in found._confused_with([], scored, effect)}
+    assert 'supply_sag' in confused('payload_error')
+    assert {'payload_error', 'airflow'} <= confused('supply_sag')
+    assert 'encoder_offset' not in confused('supply_sag')
+
+
+@pytest.mark.parametrize('further, ended', [(-1.0, True), (-10.0, False)])
+def test_what_is_confused_with_an_alternative_is_fitted_to_the_end(model, monkeypatch, further,
+                                                                   ended):
+    """As long as that could as well be the answer."""
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]),
+                      [*TRIED, 'airflow'])
+    answer, sag, fan = (frozenset([name]) for name in ('payload_error', 'supply_sag', 'airflow'))
+    begun = dataclasses.replace(found.sets.fits[fan], covariance=None, log_evidence=-1e6)
+    found.sets.fits[fan] = begun
+    monkeypatch.setattr(found.sets, 'valid', lambda: [answer, sag])
+    monkeypatch.setattr(found.sets, 'log_posterior', {answer: 0.0, sag: further}.get)
+    found._end_confused_with(answer)
+    assert (found.sets.fits[fan] is not begun) == ended
+
+
 def test_of_what_changes_much_the_start_that_is_nearest_is_tried(model):
     """Where the wire hardly transforms any more, no derivative says what a larger value does."""
     hidden = [effect_of(model, 'pwm_dead_zone', Vd=1.2), effect_of(model, 'supply_sag', Rs=0.9)]
