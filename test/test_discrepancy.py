@@ -149,20 +149,28 @@ def by_load(loads, **parts):
 
 
 def test_the_error_of_the_length_is_that_under_the_load_of_the_arm():
-    """And of the loads near it; outer ones were extrapolated to, which counts beyond them."""
-    loads, places = (1.0, 3.0, 5.0, 7.0), np.array([-1.0, 1.0, 3.0, 5.0, 7.0, 9.0])
-    asked = np.array([-9.0, -1.0, 1.0, 2.5, 5.0, 9.0, 20.0])
+    """As the loads near it say, and the more, the further the next load of the bench is."""
+    loads, asked = (1.0, 3.0, 5.0, 9.0), np.array([-1.0, 1.0, 2.5, 5.0, 7.0, 11.0, 13.0])
 
     def error(**parts):
         return discrepancy.length_errors(bicep_model(metrics=by_load(loads, **parts)), asked)
-    found = error(left_out=[8e-4, 2e-4, 1e-4, 6e-4], identification=[4e-4, 1e-5, 1e-5, 3e-4])
-    squares = 1e-8 * np.array([8.0, 4.0, 2.0, 1.0, 3.0, 6.0]) ** 2
-    for load, one in zip(np.clip(asked, -1.0, 9.0), found):
-        near = np.exp(-0.5 * ((load - places) / 2.0) ** 2)
-        assert one == pytest.approx(np.sqrt(near @ squares / near.sum()))
-    assert found[0] == found[1] > found[2] > found[4] and found[-1] == found[-2]
+    found = error(left_out=[8e-4, 2e-4, 1e-4, 6e-4], identification=[4e-4, 1e-5, 2e-4, 3e-4])
+    at_loads = 1e-8 * np.array([4.0, 0.1, 2.0, 3.0]) ** 2
+    further = 1e-8 * np.array([48.0, 3.99, 0.0, 27.0])
+    away = np.array([2.0, 0.0, 0.5, 0.0, 2.0, 2.0, 4.0])
+    for load, distance, one in zip(np.clip(asked, 1.0, 9.0), away, found):
+        near = np.exp(-0.5 * ((load - np.array(loads)) / 2.0) ** 2)
+        grown = near @ further / (near @ np.array([4.0, 4.0, 4.0, 16.0])) * distance ** 2
+        assert one == pytest.approx(np.sqrt(near @ at_loads / near.sum() + grown))
     same = error(left_out=4 * [1e-4], identification=4 * [1e-5], verification=4 * [3e-4])
-    assert same == pytest.approx(len(asked) * [3e-4], rel=0.02)
+    assert same == pytest.approx(len(asked) * [3e-4])
+
+
+def test_a_load_that_was_left_out_says_twice_what_one_that_lacks_in_between_does():
+    """Without it the next one is as far away as they are apart; from their middle it is half."""
+    metrics = by_load((1.0, 3.0, 5.0), left_out=3 * [3e-4], identification=3 * [0.0])
+    found = discrepancy.length_errors(bicep_model(metrics=metrics), np.array([1.0, 2.0, 4.5, 7.0]))
+    assert found == pytest.approx([0.0, 1.5e-4, 0.75e-4, 3e-4])
 
 
 @pytest.mark.parametrize('metrics', [

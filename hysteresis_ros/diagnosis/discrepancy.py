@@ -154,11 +154,12 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     """
     Return the root mean square error of the length [m] that the bench has shown under a load.
 
-    The larger one of that on trials that were not fitted and, from three loads on, that on loads
-    left out of the fit. The lightest and the heaviest one count as fitted: to predict them others
-    are extrapolated, which counts as far beyond them as the next load is away. Errors of few rows
-    are uncertain, so that those of near loads are averaged, with Gaussian weights as wide as loads
-    are apart. With fewer loads or none, it is one number for all.
+    Under the bench's own loads it is the larger one of that on rows that were fitted and on trials
+    that were not. What a load shows beyond that when it is left out, it shows at its distance from
+    the nearest one that stays; between and beyond the loads it counts in proportion to theirs,
+    which are half as large in the middle between two. Errors of few rows are uncertain, so that
+    those of near loads are averaged, with Gaussian weights as wide as loads are apart. With fewer
+    than three loads it is one number for all.
 
     Parameters
     ----------
@@ -178,15 +179,17 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     loads, errors = left_out
     if len(loads) < FEWEST_LOADS or len(fitted[0]) != len(loads):
         return np.full(len(load), length_error(model))
-    within = np.concatenate((fitted[1][:1], errors[1:-1], fitted[1][-1:]))
+    at_loads = fitted[1]
     if len(verified[0]):
-        within = np.maximum(within, np.interp(loads, verified[0], verified[1]))
-    beyond = [np.maximum(errors[end], within[end]) for end in (0, -1)]
-    places = np.concatenate(([2.0 * loads[0] - loads[1]], loads, [2.0 * loads[-1] - loads[-2]]))
-    squares = np.concatenate((beyond[:1], within, beyond[1:])) ** 2
-    width = float(np.median(np.diff(loads)))
-    near = np.exp(-0.5 * ((np.clip(load, places[0], places[-1])[:, None] - places) / width) ** 2)
-    return np.sqrt(near @ squares / np.sum(near, axis=1))
+        at_loads = np.maximum(at_loads, np.interp(loads, *verified))
+    gaps = np.diff(loads)
+    to_next = np.minimum(np.append(np.inf, gaps), np.append(gaps, np.inf))
+    within = np.clip(load, loads[0], loads[-1])[:, None] - loads
+    near = np.exp(-0.5 * (within / np.median(gaps)) ** 2)
+    near /= np.sum(near, axis=1, keepdims=True)
+    growth = near @ np.maximum(errors ** 2 - at_loads ** 2, 0.0) / (near @ to_next ** 2)
+    away = np.min(np.abs(load[:, None] - loads), axis=1)
+    return np.sqrt(near @ at_loads ** 2 + growth * away ** 2)
 
 
 def relative_errors(model: MuscleModel, martensite: np.ndarray) -> np.ndarray:
