@@ -101,6 +101,6 @@ def simplest_forms(effects: Sequence[Effect]) -> Forms:
 def other_forms(effects: Sequence[Effect]) -> list[Forms]:
     """Return the forms, one at a time, that effects do not have of those to choose from."""
     return [{effect.id: {parameter.name: choice}} for effect in effects
-            for parameter in effect.parameters if parameter.form
+            for parameter in effect.parameters if parameter.form and 'bench' in parameter.kinds
             for choice in parameter.choices
             if choice not in (parameter.neutral, effect.values[parameter.name])]

@@ -375,6 +375,10 @@ class Effect(abc.ABC):
         """Return the effect without parameters that only transients determine: they keep values."""
         return self
 
+    def at_rest(self) -> 'Effect | None':
+        """Return the effect as it acts when all has settled; None if it then does nothing."""
+        return None if self.needs_transients else self
+
     def guesses(self, measured: np.ndarray) -> list[dict]:
         """Return values by name that the measured response (n,) suggests to start a fit from."""
         return []

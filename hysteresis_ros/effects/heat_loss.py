@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.base import Effect, Inputs, Parameter, Surroundings, Values
 from hysteresis_ros.effects.thermal import FASTEST, FirstOrderLag, LAGS
 from hysteresis_ros.false_position import false_position
 from hysteresis_ros.kernels.lag import approach, growing_lag
@@ -28,13 +28,18 @@ class HeatLoss(FirstOrderLag):
     natural convection, h ~ (T - T0)^(1/4), has a rate ~ q^(1/5), radiation one ~ T^3. From a fifth
     of the full drive on, where wires transform, a straight line in q is within 3 % of either.
 
+    Where the bench lost heat in proportion to the temperature, as a fan or a housing makes it, and
+    the arm does not, q stands for the temperature, and an arm at rest shows the loss, too. Where
+    both lose as much, `linear` says.
+
     The recorded or assumed ambient temperature goes on counting as in a constant h.
     """
 
     id = 'heat_loss'
     sentence = 'The hotter the wire, the faster it gives off heat: it cools faster than a lag says.'
     equation = ('d(Vs^2)/dt = d1 (1 + growth Vs^2 / Vm^2) (V^2 - Vs^2), Vm the full drive and 1/d1 '
-                'the time constant near ambient')
+                'the time constant near ambient; where linear is not 0, d(Vs^2)/dt = d1 (n V^2 - '
+                'Vs^2 - growth Vs^4 / (2 Vm^2)), n = 1 + growth (1 - linear) / 2')
     source = ('natural convection of horizontal cylinders: Churchill and Chu, Int. J. Heat Mass '
               'Transfer 18 (1975) 1049; radiation: Stefan-Boltzmann')
     shows_in = 'time since a step, against where it begins: faster from hot than into cold'
@@ -46,53 +51,113 @@ class HeatLoss(FirstOrderLag):
                   (0.5, 2.0, 6.0, 25.0), log=True),
         # Natural convection has 0.5 over the loop; radiation alone, from 20 to 120 degC, 1.4.
         Parameter('growth', '1', 'share by which the rate at full drive exceeds that near ambient',
-                  0.05, 1.5, 0.0, (0.3, 1.0), log=True),)
+                  0.05, 1.5, 0.0, (0.3, 1.0), log=True),
+        Parameter('linear', '1', 'whether the bench lost heat in proportion to the temperature: '
+                  '0: no, as the arm does; 1: it did, as much as the arm near ambient, or, 0.5: as '
+                  'the arm where half of the full drive squared keeps the bench', 0.0, 1.0, 0.0,
+                  (0.0,), choices=(0.0, 0.5, 0.65, 1.0), kinds=('arm',), form=True))
+
+    # Such a loss shows at rest, too.
+    needs_transients = False
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:
         """Whether the drive heats the wire above its surroundings by what q stands for."""
         return surroundings.drive in ('voltage', 'current', 'power')
 
+    def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
+        """Begin also with a bench that lost heat in proportion, fast and slow."""
+        return [{'time_constant': time, 'growth': 0.5, 'linear': linear}
+                for time in (0.5, 4.0) for linear in (0.5, 0.65, 1.0)]
+
+    def in_settled_rows(self) -> Effect:
+        """Return the effect without its lag, and with a bench that lost heat in proportion."""
+        choices = tuple(choice for one in self.parameters if one.name == 'linear'
+                        for choice in one.choices if choice)
+        return self.with_parameter('time_constant', kinds=()).with_parameter(
+            'linear', choices=choices, starts=choices)
+
+    def at_rest(self) -> Effect | None:
+        """Return it without its lag, where it is the bench that lost heat in proportion."""
+        return self.with_values(time_constant=0.0) if self.linear else None
+
     def _growth(self, surroundings: Surroundings) -> float:
         """Return the growth of the rate per unit of q."""
         return self.growth / (surroundings.full_drive_squared or 1.0)
 
+    def _keeps(self, drive_squared: Values, surroundings: Surroundings) -> Values:
+        """Return the q that a drive squared keeps; below 0 nothing is heated, and all is linear."""
+        if not self.linear:
+            return drive_squared
+        heating = self._gain * drive_squared
+        growth = self._growth(surroundings)
+        return 2.0 * heating / (1.0 + np.sqrt(1.0 + 2.0 * growth * np.maximum(heating, 0.0)))
+
+    def _kept_by(self, q: float, surroundings: Surroundings) -> float:
+        """Return the drive squared that keeps a q."""
+        if not self.linear:
+            return q
+        return q * (1.0 + 0.5 * self._growth(surroundings) * max(q, 0.0)) / self._gain
+
+    @property
+    def _gain(self) -> float:
+        return 1.0 + 0.5 * self.growth * (1.0 - self.linear)
+
+    def _approaching(self, kept: Values, surroundings: Surroundings) -> tuple[Values, Values]:
+        """
+        Return rate [1/s] at q = 0, and its growth per unit of q, on the way to the q kept.
+
+        On the scale of the temperature the loss, 1 + growth q / (2 Vm^2) times q, has a second
+        root, and what is between the two is ``(1 + growth (q + kept) / (2 Vm^2)) (kept - q)``.
+        """
+        rate, growth = min(self.rate(True), FASTEST), self._growth(surroundings)
+        if not self.linear:
+            return rate + 0.0 * kept, growth + 0.0 * kept
+        faster = 1.0 + 0.5 * growth * np.maximum(kept, 0.0)
+        return rate * faster, 0.5 * growth / faster
+
     def step(self, value: float, dt: float, phase: float, surroundings: Surroundings) -> float:
-        """Advance by `dt` [s] towards `value`."""
+        """Advance by `dt` [s] towards what `value` keeps."""
         q = self._cold(value, surroundings) if self._q is None else self._q
-        self._q = self._after(q, value, dt, surroundings)
+        self._q = self._after(q, float(self._keeps(value, surroundings)), dt, surroundings)
         return self._q
 
     def forward(self, signal: np.ndarray, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Do what `step` does for a whole trial."""
         self.start()
         dt = np.ascontiguousarray(np.broadcast_to(inputs.dt, np.shape(signal)), float)
+        kept = np.ascontiguousarray(self._keeps(signal, surroundings), float)
         course = growing_lag(
-            np.ascontiguousarray(signal, float), dt, min(self.rate(True), FASTEST),
-            self._growth(surroundings), float(self._cold(signal[0], surroundings)))
+            kept, dt, *self._approaching(kept, surroundings),
+            float(self._cold(signal[0], surroundings)))
         self._q = float(course[-1])
         return course
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Return the input that brings q to `signal` in ``inputs.dt`` seconds."""
+        return self._kept_by(self._aimed_at(signal, inputs.dt, surroundings), surroundings)
+
+    def _aimed_at(self, signal: float, dt: float, surroundings: Surroundings) -> float:
+        """Return the q to set out for, to be at `signal` in `dt` [s]."""
         q, rate = self._q, self.rate(True)
-        if q is None or not 0.0 < inputs.dt < math.inf or rate == math.inf or q == signal:
+        if q is None or not 0.0 < dt < math.inf or rate == math.inf or q == signal:
             return signal
         # On its way the rate is nowhere less than here: its answer is as far or further.
-        slowest = rate * (1.0 + self._growth(surroundings) * max(min(q, signal), 0.0))
-        decay = math.exp(-slowest * inputs.dt)
+        growth = self._growth(surroundings) * (0.5 if self.linear else 1.0)
+        slowest = rate * (1.0 + growth * max(min(q, signal), 0.0))
+        decay = math.exp(-slowest * dt)
         furthest = signal + (signal - q) * decay / max(1.0 - decay, LEAST_SHARE)
 
-        def missing(value: float) -> float:
-            return self._after(q, value, inputs.dt, surroundings) - signal
+        def missing(kept: float) -> float:
+            return self._after(q, kept, dt, surroundings) - signal
         lacking, beyond = missing(signal), missing(furthest)
         if lacking * beyond >= 0.0:
             return furthest
         return false_position(missing, (signal, lacking), (furthest, beyond),
                               TOLERANCE * (surroundings.full_drive_squared or 1.0))
 
-    def _after(self, q: float, value: float, dt: float, surroundings: Surroundings) -> float:
-        rate = self.rate(True)
-        if rate == math.inf:
-            return value
-        return float(approach(q, value, rate, self._growth(surroundings), dt))
+    def _after(self, q: float, kept: float, dt: float, surroundings: Surroundings) -> float:
+        if self.rate(True) == math.inf:
+            return kept
+        rate, growth = self._approaching(kept, surroundings)
+        return float(approach(q, kept, float(rate), float(growth), dt))

@@ -66,8 +66,8 @@ def approach(q: float, value: float, rate: float, growth: float, dt: float) -> f
 
 
 @jit
-def growing_lag(values: np.ndarray, dt: np.ndarray, rate: float, growth: float, q: float
-                ) -> np.ndarray:
+def growing_lag(values: np.ndarray, dt: np.ndarray, rate: np.ndarray, growth: np.ndarray,
+                q: float) -> np.ndarray:
     """
     Return the course of `approach` under inputs held from one row to the next.
 
@@ -75,8 +75,8 @@ def growing_lag(values: np.ndarray, dt: np.ndarray, rate: float, growth: float, 
     ----------
     values, dt : ndarray, shape (rows,)
         Input, and time since the row before [s].
-    rate, growth : float
-        As for `approach`.
+    rate, growth : ndarray, shape (rows,)
+        As for `approach`, while the input of a row is held.
     q : float
         q before the first row.
 
@@ -87,6 +87,6 @@ def growing_lag(values: np.ndarray, dt: np.ndarray, rate: float, growth: float, 
     """
     course = np.empty(len(values))
     for n in range(len(values)):
-        q = approach(q, values[n], rate, growth, dt[n])
+        q = approach(q, values[n], rate[n], growth[n], dt[n])
         course[n] = q
     return course

@@ -121,7 +121,8 @@ class Controller:
         usable = [effect.with_values(latent=0.0) if isinstance(effect, LatentHeat) else effect
                   for effect in usable]
         self._chain = Chain(usable, model.surroundings)
-        self._steady = Chain([effect for effect in usable if not effect.needs_transients],
+        at_rest = [effect.at_rest() for effect in usable]
+        self._steady = Chain([effect for effect in at_rest if effect is not None],
                              model.surroundings)
         self._first = model.first_stage(self._chain)
         self._force = copy.deepcopy(model.force_stage)
