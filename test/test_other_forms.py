@@ -116,6 +116,23 @@ def test_heat_lost_by_convection_or_radiation_alone_is_heat_loss(monkeypatch, ra
     assert found.rmse_after < 0.4 * found.rmse_before
 
 
+@pytest.mark.parametrize('protocol', [
+    'arm-steps', pytest.param('arm-dynamic', marks=pytest.mark.long)])
+def test_heat_that_is_lost_otherwise_than_on_the_bench_is_heat_loss(monkeypatch, protocol):
+    """By natural convection from the arm's wires, from those of the bench in proportion."""
+    def change(air, excess, balance, rate, dt):
+        count = max(1, math.ceil(rate * dt / 0.05))
+        now = excess
+        for _ in range(count):
+            lost = math.copysign(40.0 * abs(now / 40.0) ** 1.25, now)
+            now += rate * dt / count * (balance - lost)
+        return now - excess
+    monkeypatch.setattr(still_air.StillAir, 'change', change)
+    found = found_in({'heat_loss': 1.0}, 5, protocol=protocol, trials=(0, 1))
+    assert found.verdict == 'missing' and 'heat_loss' in named(found)
+    assert found.rmse_after < 0.4 * found.rmse_before
+
+
 class Saturating(float):
     """A shift [K/Pa] that grows less and less with the stress that it is multiplied by."""
 

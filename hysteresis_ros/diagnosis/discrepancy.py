@@ -181,7 +181,7 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
         return np.full(len(load), length_error(model))
     at_loads = fitted[1]
     if len(verified[0]):
-        at_loads = np.maximum(at_loads, np.interp(loads, *verified))
+        at_loads = np.maximum(at_loads, np.interp(loads, verified[0], verified[1]))
     gaps = np.diff(loads)
     to_next = np.minimum(np.append(np.inf, gaps), np.append(gaps, np.inf))
     within = np.clip(load, loads[0], loads[-1])[:, None] - loads
