@@ -61,6 +61,19 @@ def test_the_models_own_arm_reaches_every_target(names):
     np.testing.assert_allclose(angles, targets, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize('linear', [0.5, 1.0])
+@pytest.mark.parametrize('time_constant', [0.0, 4.0])
+def test_targets_are_reached_where_an_arm_loses_heat_otherwise_than_the_bench(
+        time_constant, linear):
+    """What it loses at rest is undone whether or not it lags."""
+    model = bicep_model()
+    model = dataclasses.replace(model, effects=[catalogue()['heat_loss'](
+        model.surroundings, time_constant=time_constant, growth=0.8, linear=linear)])
+    angles, setpoints = drive_arm(model, repeats=10)
+    assert not any(setpoint.saturated for setpoint in setpoints)
+    np.testing.assert_allclose(angles, TARGETS, rtol=0.0, atol=1e-6)
+
+
 def test_a_sensor_without_a_memory_needs_no_state_of_rest():
     """Nor the lengths from which that would follow."""
     model = dataclasses.replace(bicep_model(['encoder_offset']), length_stage=None)
