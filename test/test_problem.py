@@ -34,6 +34,8 @@ def test_what_needs_transients_is_unobservable_in_settled_rows(problem):
     """With the reason; and what was not asked for is not mentioned."""
     names, unobservable = observable(problem)
     assert unobservable['thermal_lag'] == 'every row is settled'
+    # A wire that loses heat otherwise than on the bench does so at rest, too.
+    assert 'heat_loss' in names
     assert 'was not recorded' in unobservable['ambient_temperature']
     assert not set(names) & set(unobservable)
     few = problem_for(problem.model, problem.measurements, ['thermal_lag', 'payload_error'])
