@@ -421,7 +421,7 @@ def test_in_settled_rows_only_creep_that_goes_on_frees_its_time():
     assert any(start.effect.kept for start in found)
 
 
-@pytest.mark.parametrize('name', ['end_stop', 'overload', 'encoder_eccentricity', 'heat_loss'])
+@pytest.mark.parametrize('name', ['end_stop', 'overload', 'encoder_eccentricity', 'r_phase'])
 def test_of_many_starts_the_best_is_linearised_with_other_effects(name):
     """With the derivatives that they had alone that has the best evidence which does with its."""
     model = bicep_model()
