@@ -85,16 +85,16 @@ class HeatLoss(FirstOrderLag):
         """Return the growth of the rate per unit of q."""
         return self.growth / (surroundings.full_drive_squared or 1.0)
 
-    def _keeps(self, drive_squared: Values, surroundings: Surroundings) -> Values:
-        """Return the q that a drive squared keeps; below 0 nothing is heated, and all is linear."""
+    def _settles_at(self, drive_squared: Values, surroundings: Surroundings) -> Values:
+        """Return q settled at a drive squared; below 0 nothing is heated, and all is linear."""
         if not self.linear:
             return drive_squared
-        heating = self._gain * drive_squared
+        scaled = self._gain * drive_squared
         growth = self._growth(surroundings)
-        return 2.0 * heating / (1.0 + np.sqrt(1.0 + 2.0 * growth * np.maximum(heating, 0.0)))
+        return 2.0 * scaled / (1.0 + np.sqrt(1.0 + 2.0 * growth * np.maximum(scaled, 0.0)))
 
-    def _kept_by(self, q: float, surroundings: Surroundings) -> float:
-        """Return the drive squared that keeps a q."""
+    def _settling_at(self, q: float, surroundings: Surroundings) -> float:
+        """Return the drive squared at which q settles."""
         if not self.linear:
             return q
         return q * (1.0 + 0.5 * self._growth(surroundings) * max(q, 0.0)) / self._gain
@@ -103,39 +103,39 @@ class HeatLoss(FirstOrderLag):
     def _gain(self) -> float:
         return 1.0 + 0.5 * self.growth * (1.0 - self.linear)
 
-    def _approaching(self, kept: Values, surroundings: Surroundings) -> tuple[Values, Values]:
+    def _approaching(self, settled: Values, surroundings: Surroundings) -> tuple[Values, Values]:
         """
-        Return rate [1/s] at q = 0, and its growth per unit of q, on the way to the q kept.
+        Return rate [1/s] at q = 0, and its growth per unit of q, on the way to the q settled.
 
-        On the scale of the temperature the loss, 1 + growth q / (2 Vm^2) times q, has a second
-        root, and what is between the two is ``(1 + growth (q + kept) / (2 Vm^2)) (kept - q)``.
+        As the loss is quadratic in q, ``dq/dt = d1 (1 + growth (q + settled) / (2 Vm^2))
+        (settled - q)``.
         """
         rate, growth = min(self.rate(True), FASTEST), self._growth(surroundings)
         if not self.linear:
-            return rate + 0.0 * kept, growth + 0.0 * kept
-        faster = 1.0 + 0.5 * growth * np.maximum(kept, 0.0)
+            return rate + 0.0 * settled, growth + 0.0 * settled
+        faster = 1.0 + 0.5 * growth * np.maximum(settled, 0.0)
         return rate * faster, 0.5 * growth / faster
 
     def step(self, value: float, dt: float, phase: float, surroundings: Surroundings) -> float:
-        """Advance by `dt` [s] towards what `value` keeps."""
+        """Advance by `dt` [s] towards where q settles at `value`."""
         q = self._cold(value, surroundings) if self._q is None else self._q
-        self._q = self._after(q, float(self._keeps(value, surroundings)), dt, surroundings)
+        self._q = self._after(q, float(self._settles_at(value, surroundings)), dt, surroundings)
         return self._q
 
     def forward(self, signal: np.ndarray, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Do what `step` does for a whole trial."""
         self.start()
         dt = np.ascontiguousarray(np.broadcast_to(inputs.dt, np.shape(signal)), float)
-        kept = np.ascontiguousarray(self._keeps(signal, surroundings), float)
+        settled = np.ascontiguousarray(self._settles_at(signal, surroundings), float)
         course = growing_lag(
-            kept, dt, *self._approaching(kept, surroundings),
+            settled, dt, *self._approaching(settled, surroundings),
             float(self._cold(signal[0], surroundings)))
         self._q = float(course[-1])
         return course
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Return the input that brings q to `signal` in ``inputs.dt`` seconds."""
-        return self._kept_by(self._aimed_at(signal, inputs.dt, surroundings), surroundings)
+        return self._settling_at(self._aimed_at(signal, inputs.dt, surroundings), surroundings)
 
     def _aimed_at(self, signal: float, dt: float, surroundings: Surroundings) -> float:
         """Return the q to set out for, to be at `signal` in `dt` [s]."""
@@ -148,16 +148,16 @@ class HeatLoss(FirstOrderLag):
         decay = math.exp(-slowest * dt)
         furthest = signal + (signal - q) * decay / max(1.0 - decay, LEAST_SHARE)
 
-        def missing(kept: float) -> float:
-            return self._after(q, kept, dt, surroundings) - signal
+        def missing(settled: float) -> float:
+            return self._after(q, settled, dt, surroundings) - signal
         lacking, beyond = missing(signal), missing(furthest)
         if lacking * beyond >= 0.0:
             return furthest
         return false_position(missing, (signal, lacking), (furthest, beyond),
                               TOLERANCE * (surroundings.full_drive_squared or 1.0))
 
-    def _after(self, q: float, kept: float, dt: float, surroundings: Surroundings) -> float:
+    def _after(self, q: float, settled: float, dt: float, surroundings: Surroundings) -> float:
         if self.rate(True) == math.inf:
-            return kept
-        rate, growth = self._approaching(kept, surroundings)
-        return float(approach(q, kept, float(rate), float(growth), dt))
+            return settled
+        rate, growth = self._approaching(settled, surroundings)
+        return float(approach(q, settled, float(rate), float(growth), dt))
