@@ -110,7 +110,7 @@ def test_angles_shifted_after_the_recording_are_late(model):
         angle[part] = np.interp(train.time[part] - 0.6, train.time[part], angle[part])
     shifted = Measurement.from_columns({**train.columns, 'angle': angle})
     found = diagnose(model, [shifted], RIVALS, seed=SEED)
-    assert found.missing[0] == 'latency' and found.effects[0].held == 1.0
+    assert found.missing == ['latency'] and found.effects[0].held == 1.0
     # Of the rows every sixth is judged, 0.6 s apart.
     assert found.effects[0].delay == pytest.approx(0.6, abs=0.3)
 

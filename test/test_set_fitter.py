@@ -82,3 +82,26 @@ def test_a_further_effect_that_only_led_out_of_a_local_minimum_is_no_answer(mode
     assert found.sets.fits[single].effects[0].dm == pytest.approx(15.0, abs=1.0)
     # Nothing is left that a larger set would begin better.
     assert found.fitting._worth_fitting_without(frozenset(pair.names)) == []
+
+
+def test_a_set_that_was_fitted_better_since_is_a_start_without_its_effects_again(model):
+    """What it held when it was stuck itself says nothing of where it has come to."""
+    found = selection(model, recording(model, [effect_of(model, 'payload_error', dm=15.0)]))
+    single, offset = frozenset(['payload_error']), effect_of(model, 'encoder_offset', offset=0.3)
+    names = single | {'encoder_offset'}
+
+    def with_payload(dm):
+        payload = effect_of(model, 'payload_error', dm=dm)
+        one, = found.fitter.fit([[payload]], found.fitting.metric, 0)
+        both, = found.fitter.fit([[payload, offset]], found.fitting.metric, 0)
+        return one, both
+    stuck, (_, early), (_, late) = with_payload(1.0)[0], with_payload(2.0), with_payload(15.0)
+    found.sets.fits = {frozenset(): found.sets.base, single: stuck, names: early}
+    found.sets.keep_least(single, stuck.predicted)
+
+    def begun():
+        return [one.dm for start in found.fitting._worth_fitting_without(names)
+                for one in start if one.id == 'payload_error']
+    assert (begun(), begun()) == ([2.0], [])
+    found.sets.fits[names] = late
+    assert (begun(), begun()) == ([15.0], [])

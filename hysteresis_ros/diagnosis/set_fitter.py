@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 import itertools
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.workers import map_in_forks
@@ -36,8 +38,8 @@ class SetFitter:
         self.sets, self.settings = sets, sets.settings
         self.fitter, self.covariance = sets.fitter, sets.covariance
         self._refined: set[frozenset[str]] = set()
-        # Sets with those of one effect fewer that were begun where they ended.
-        self._reduced: set[tuple[frozenset[str], frozenset[str]]] = set()
+        # By sets and those of one effect fewer: the response of the set where the latter began.
+        self._reduced: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
 
     def fit_best(self, scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]]) -> None:
         """Fit the best sets of those scored."""
@@ -134,12 +136,12 @@ class SetFitter:
         fit, starts = self.sets.fits[names], []
         for fewer in filter(None, subsets(names)):
             effects = [effect for effect in fit.effects if effect.id in fewer]
-            if (names, fewer) in self._reduced:
+            if self._reduced.get((names, fewer)) is fit.predicted:
                 continue
             if fewer in self.sets.fits:
                 predicted, = self.fitter.simulate([effects])
                 if not self.fitter.error(predicted) < self.sets.error(fewer):
                     continue
-            self._reduced.add((names, fewer))
+            self._reduced[names, fewer] = fit.predicted
             starts.append(effects)
         return starts
