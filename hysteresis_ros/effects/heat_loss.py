@@ -29,8 +29,8 @@ class HeatLoss(FirstOrderLag):
     of the full drive on, where wires transform, a straight line in q is within 3 % of either.
 
     Where the bench lost heat in proportion to the temperature, as a fan or a housing makes it, and
-    the arm does not, q stands for the temperature, and an arm at rest shows the loss, too. Where
-    both lose as much, `linear` says.
+    the arm does not, q stands for the temperature, and an arm at rest shows the loss, too. `linear`
+    says where both lose as much: of the choices, near ambient, where wires transform, or halfway.
 
     The recorded or assumed ambient temperature goes on counting as in a constant h.
     """
@@ -42,8 +42,10 @@ class HeatLoss(FirstOrderLag):
                 'Vs^2 - growth Vs^4 / (2 Vm^2)), n = 1 + growth (1 - linear) / 2')
     source = ('natural convection of horizontal cylinders: Churchill and Chu, Int. J. Heat Mass '
               'Transfer 18 (1975) 1049; radiation: Stefan-Boltzmann')
-    shows_in = 'time since a step, against where it begins: faster from hot than into cold'
-    experiment = 'steps down from full heat and from half of it, recorded faster than they settle'
+    shows_in = ('time since a step, against where it begins: faster from hot than into cold; where '
+                'the bench lost heat otherwise, V at rest')
+    experiment = ('steps down from full heat and from half of it, recorded faster than they '
+                  'settle; at rest, a bench in the air of the arm')
     confused_with = ('thermal_lag', 'heating_cooling_asymmetry')
     replaces = ('thermal_lag',)
     parameters = (
@@ -52,10 +54,10 @@ class HeatLoss(FirstOrderLag):
         # Natural convection has 0.5 over the loop; radiation alone, from 20 to 120 degC, 1.4.
         Parameter('growth', '1', 'share by which the rate at full drive exceeds that near ambient',
                   0.05, 1.5, 0.0, (0.3, 1.0), log=True),
-        Parameter('linear', '1', 'whether the bench lost heat in proportion to the temperature: '
-                  '0: no, as the arm does; 1: it did, as much as the arm near ambient, or, 0.5: as '
-                  'the arm where half of the full drive squared keeps the bench', 0.0, 1.0, 0.0,
-                  (0.0,), choices=(0.0, 0.5, 0.65, 1.0), kinds=('arm',), form=True))
+        Parameter('linear', '1', '0: the bench lost heat as the arm does; else it lost it in '
+                  'proportion to the temperature, and as much as the arm at 1 - linear of the full '
+                  'drive squared (1: near ambient)', 0.0, 1.0, 0.0, (0.0,),
+                  choices=(0.0, 0.5, 0.65, 1.0), kinds=('arm',), form=True))
 
     # Such a loss shows at rest, too.
     needs_transients = False
