@@ -22,7 +22,7 @@ from model_support import arm_run, bicep_model, effect_of, STRENGTHS, wandering_
 # Stage, a word of what it shows in, a word of what excites it, and what it is confused with.
 EXPECTED = {
     'supply_sag': ('electrical', 'V', 'at the wire', {'airflow'}),
-    'pwm_dead_zone': ('electrical', 'low V', 'fine steps', {'ambient_drift'}),
+    'pwm_dead_zone': ('electrical', 'low V', 'fine steps of the voltage from 0', {'ambient_drift'}),
     'measured_supply': ('electrical', 'recorded supply', 'log the supply',
                         {'supply_sag', 'ambient_drift'}),
     'resistance_change': ('electrical', 'middle of the loop', 'current', {'stress_dependence'}),

@@ -11,6 +11,7 @@ from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory import still_air
 from hysteresis_ros.laboratory.arm import Arm
+from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.grain_wire import GrainMaterial, GrainWire
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.parallel_wires import ParallelWires
@@ -131,6 +132,25 @@ def test_heat_that_is_lost_otherwise_than_on_the_bench_is_heat_loss(monkeypatch,
     found = found_in({'heat_loss': 1.0}, 5, protocol=protocol, trials=(0, 1))
     assert found.verdict == 'missing' and 'heat_loss' in named(found)
     assert found.rmse_after < 0.4 * found.rmse_before
+
+
+@pytest.mark.parametrize('passes, above', [
+    (lambda voltage: voltage if voltage >= 3.6 else 0.0, 2.0),
+    pytest.param(lambda voltage: max(voltage - 0.6, 0.0), 1.0, marks=pytest.mark.long)])
+def test_a_board_that_does_not_stretch_what_it_passes_has_a_dead_zone(monkeypatch, passes, above):
+    """Pulses that drop out below 3.6 V, and a diode's drop of 0.6 V."""
+    drive_squared = Conditions.drive_squared
+
+    def otherwise(own, voltage, *others):
+        dead, own.dead_voltage = own.dead_voltage, 0.0
+        found = drive_squared(own, passes(voltage) if dead else voltage, *others)
+        own.dead_voltage = dead
+        return found
+    monkeypatch.setattr(Conditions, 'drive_squared', otherwise)
+    found = found_in({'pwm_dead_zone': 1.0}, 5, protocol='arm-steps', trials=(0, 1))
+    assert (found.verdict, found.missing) == ('missing', ['pwm_dead_zone'])
+    assert found.effects[0].above == above
+    assert found.effects[0].Vd == pytest.approx({1.0: 0.6, 2.0: 3.6}[above], rel=0.1)
 
 
 class Saturating(float):
