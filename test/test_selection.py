@@ -5,7 +5,7 @@
 import dataclasses
 import math
 
-from model_support import bicep_model, effect_of
+from model_support import bicep_model, effect_of, runs
 import numpy as np
 import pytest
 from selection_support import heavier, recording, selection, TRIED
@@ -227,6 +227,42 @@ def test_what_could_as_well_be_the_answer_is_fitted_to_the_end(model):
     del found.sets.fits[fan]
     found._exchange()
     assert found.sets.fits[fan].log_evidence == pytest.approx(best, abs=0.5)
+
+
+LAGS = ('thermal_lag', 'heating_cooling_asymmetry', 'latent_heat', 'heat_loss')
+
+
+@pytest.fixture(scope='module')
+def late(model):
+    """Return what a recording of an arm that lags behind shows of effects with a lag in them."""
+    measured = runs(model.with_effects([effect_of(model, 'thermal_lag', time_constant=4.0)]),
+                    rows=60, dt=1.0)
+    return selection(model, measured, LAGS)
+
+
+def test_an_equation_begins_also_where_the_one_that_it_contains_has_ended(late):
+    """With all forms that it has, once each."""
+    lag, = late.sets.fits[frozenset(['thermal_lag'])].effects
+    starts = [own for own, in late._containing(lag)]
+    assert {own.id for own in starts} == set(LAGS[1:])
+    assert {own.time_constant for own in starts} == {lag.time_constant}
+    assert {own.linear for own in starts if own.id == 'heat_loss'} == {0.0, 0.5, 0.65, 1.0}
+    keys = [(own.id, *own.values.values()) for own in starts]
+    assert len(keys) == len(set(keys)) < sum(
+        start.id in LAGS[1:] for start in late.alone.starts)
+    asymmetry, = late.sets.fits[frozenset(['heating_cooling_asymmetry'])].effects
+    assert late._containing(asymmetry) == []
+
+
+def test_a_fit_that_went_astray_is_found_again_from_the_equation_that_it_contains(
+        late, monkeypatch):
+    """Far from there, and behind by far, it would not be named beside the lag."""
+    loss, lag = frozenset(['heat_loss']), frozenset(['thermal_lag'])
+    best = late.sets.fits[loss]
+    astray = dataclasses.replace(best, log_evidence=best.log_evidence - 1e3)
+    monkeypatch.setitem(late.sets.fits, loss, astray)
+    late._end_confused_with(lag)
+    assert late.sets.fits[loss].log_evidence > astray.log_evidence + 900.0
 
 
 def test_either_of_two_effects_may_say_that_it_is_confused_with_the_other(model):

@@ -343,18 +343,28 @@ class Selection:
         """
         Fit to the end what is easily taken for an answer of one effect, and was only begun.
 
-        Also what is easily taken for other single effects that could as well be the answer.
+        Also what is easily taken for other single effects that could as well be the answer. And an
+        equation that contains that of one of these is fitted from where it has ended, too.
         """
         least = self.sets.log_posterior(answer) + math.log(self.settings.reported)
-        singles, sets = self.alone.singles(), {}
+        singles, sets, further = self.alone.singles(), {}, []
         for names in self.sets.valid():
             if len(names) == 1 and self.sets.log_posterior(names) >= least:
-                for effects in self._confused_with([], singles, *self.sets.fits[names].effects):
+                effect, = self.sets.fits[names].effects
+                for effects in self._confused_with([], singles, effect):
                     sets[_names(effects)] = effects
+                further += self._containing(effect)
         # One that could not be begun may be fitted from another start.
-        self.fitting.fit([effects for names, effects in sets.items() if (
-            names not in self.sets.fits or self.sets.fits[names].covariance is None)])
+        self.fitting.fit([*further, *(effects for names, effects in sets.items() if (
+            names not in self.sets.fits or self.sets.fits[names].covariance is None))])
         self._test_singles()
+
+    def _containing(self, effect: Effect) -> list[list[Effect]]:
+        """Return the effects whose equation contains that of an effect, with its values."""
+        found = [start.effect.with_values(**{name: value for name, value in effect.values.items()
+                                             if name in start.effect.values})
+                 for start in self.alone.starts if effect.id in start.effect.replaces]
+        return list({(own.id, *own.values.values()): [own] for own in found}.values())
 
     def _best_with(self, others: Sequence[Effect],
                    scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
