@@ -14,6 +14,7 @@ from hysteresis_ros.diagnosis.diagnose import Diagnosis
 from hysteresis_ros.cli.diagnose import to_text
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.diagnosis.verdict import shown_or_not
+from hysteresis_ros.effects import catalogue
 from hysteresis_ros.report.diagnosis_page import write_diagnosis, write_extension
 from hysteresis_ros.report.resources import script, script_digest
 from hysteresis_ros.report.words import parameters_in_words, verdict_in_words
@@ -41,7 +42,9 @@ def row(effect, after, plausible=True):
     """Return a row of the ranking."""
     return {'effect': effect, 'rmse_before': 0.08, 'rmse_after': after,
             'gain': 1.0 - after / 0.08, 'gain_low': 0.1, 'gain_high': 0.95, 'p_value': 0.002,
-            'parameters': {'dm': {'value': 15.0, 'low': 14.0, 'high': 16.0, 'unit': 'g'}},
+            'parameters': {
+                name: {**entry, 'value': 15.0, 'low': 14.0, 'high': 16.0} for name, entry in
+                catalogue()[effect](None).to_dict()['parameters'].items()},
             'plausible': plausible, 'absorbed': 0.4, 'confused_with': []}
 
 
@@ -249,7 +252,17 @@ def test_an_effect_is_not_both_ranked_and_one_that_could_not_have_shown():
 
 
 def test_the_words_of_values_have_units_and_intervals_where_there_are_any():
-    values = {'b': {'value': 0.12345, 'low': 0.1, 'high': 0.15, 'unit': '% of l0'},
-              'kept': {'value': 1.0, 'low': 1.0, 'high': 1.0, 'unit': '1'}}
-    assert parameters_in_words(values) == 'b 0.123 (0.1 to 0.15) % of l0, kept 1'
-    assert parameters_in_words(values, intervals=False) == 'b 0.123 % of l0, kept 1'
+    values = {'B': {'value': 1.2345, 'low': 1.1, 'high': 1.5, 'unit': 'deg'},
+              'seat': {'value': -1.0, 'low': -1.0, 'high': -1.0, 'unit': '1'},
+              'zeroed': {'value': 1.0, 'low': 1.0, 'high': 1.0, 'unit': '1'}}
+    assert (parameters_in_words('backlash', values)
+            == 'B 1.23 (1.1 to 1.5) deg, seat -1, zeroed 1')
+    assert (parameters_in_words('backlash', values, intervals=False)
+            == 'B 1.23 deg, seat -1, zeroed 1')
+
+
+def test_the_words_of_values_say_nothing_of_a_form_that_an_effect_does_not_have():
+    values = effect_of(bicep_model(), 'pwm_dead_zone', Vd=0.4).to_dict()['parameters']
+    assert parameters_in_words('pwm_dead_zone', values) == 'Vd 0.4 V'
+    values['above']['value'] = 2.0
+    assert parameters_in_words('pwm_dead_zone', values, False) == 'Vd 0.4 V, above 2'

@@ -98,7 +98,7 @@ def to_text(found: Diagnosis, response: str) -> str:
         lines.append('probability: ' + all_probabilities(found))
     rows = [['effect', f'{found.error_name} after [{unit}]', 'gain', 'p', 'absorbed', 'parameters']]
     for row in found.ranking[:10]:
-        values = parameters_in_words(row['parameters'], intervals=False)
+        values = parameters_in_words(row['effect'], row['parameters'], intervals=False)
         rows.append([row['effect'], f'{factor * row["rmse_after"]:.3g}',
                      f'{100.0 * row["gain"]:.0f} %', found.p_value(row),
                      f'{100.0 * row["absorbed"]:.0f} %',

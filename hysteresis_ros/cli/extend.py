@@ -131,7 +131,8 @@ def to_text(extension: Extension, response: str) -> str:
     factor, unit = UNITS[response]
     lines = []
     for effect in extension.added:
-        lines.append(f'+ {effect.id}: {parameters_in_words(effect.to_dict()["parameters"])}')
+        values = parameters_in_words(effect.id, effect.to_dict()['parameters'])
+        lines.append(f'+ {effect.id}: {values}')
     for name in extension.implausible:
         lines.append(f'! {name} is outside its physical range: an implausible explanation')
     for label, errors in (('fitted', extension.train), ('not fitted', extension.test)):

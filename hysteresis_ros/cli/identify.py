@@ -130,5 +130,6 @@ def report(found: Identified) -> str:
                          f'{fit.rank} combinations, {len(fit.never_excited)} cells never excited, '
                          f'bias {fit.bias:.4g}')
     for effect in found.model.effects:
-        lines.append(f'+ {effect.id}: {parameters_in_words(effect.to_dict()["parameters"])}')
+        values = parameters_in_words(effect.id, effect.to_dict()['parameters'])
+        lines.append(f'+ {effect.id}: {values}')
     return '\n'.join(lines)

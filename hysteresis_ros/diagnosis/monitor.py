@@ -254,7 +254,7 @@ def in_words(found: Diagnosis) -> str:
     """Return the missing effects of a diagnosis with their values and probability."""
     words = []
     for effect, others in zip(found.effects, found.alternatives):
-        text = f'{effect.id} ({parameters_in_words(effect.to_dict()["parameters"])})'
+        text = f'{effect.id} ({parameters_in_words(effect.id, effect.to_dict()["parameters"])})'
         words.append(text + (f' or {" or ".join(others)}' if others else ''))
     names = [*found.missing, *(name for names in found.alternatives for name in names)]
     return f'{" and ".join(words)}, probability {probability(found, names):.2f}'

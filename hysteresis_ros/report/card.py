@@ -94,7 +94,7 @@ def values_of(found: Diagnosis) -> Html:
             parameters = fitted.get(one, ranked.get(one))
             if parameters:
                 lines.append(f'{"or " if one != name else ""}{linked(one)}: '
-                             + escape(parameters_in_words(parameters)))
+                             + escape(parameters_in_words(one, parameters)))
     return Html('<br>'.join(lines))
 
 
@@ -186,17 +186,14 @@ def extension_card(extension: Extension, tested: bool, quantity: str, model_path
     unit, scale = shown(quantity)
     errors = extension.test or extension.train
     before, after = (number(scale * errors[name]) for name in ('rmse_before', 'rmse_after'))
-    names = ', '.join(effect.id for effect in extension.added)
     seen = 'unseen' if tested else 'fitted'
-    values = Html('<br>'.join(
-        f'{linked(effect.id)}: {escape(parameters_in_words(effect.to_dict()["parameters"]))}'
-        for effect in extension.added))
-    effects = catalogue()
-    sentences = ' '.join(effects[effect.id].sentence for effect in extension.added
-                         if effect.id in effects)
+    added = {effect.id: effect.to_dict()['parameters'] for effect in extension.added}
+    values = Html('<br>'.join(f'{linked(name)}: {escape(parameters_in_words(name, parameters))}'
+                              for name, parameters in added.items()))
+    sentences = ' '.join(catalogue()[name].sentence for name in added if name in catalogue())
     return card(
-        linked(f'Adding {names} takes the error on the {seen} recording from {before} to {after} '
-               f'{unit} RMS'),
+        linked(f'Adding {", ".join(added)} takes the error on the {seen} recording from {before} '
+               f'to {after} {unit} RMS'),
         [('Value, with 95 % interval', values),
          (f'RMSE on the {seen} recording',
           Html(f'from <strong>{before} to {after} {unit}</strong>')),

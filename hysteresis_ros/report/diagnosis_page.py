@@ -177,7 +177,7 @@ def _ranking(found: Diagnosis, scale: float, unit: str) -> str:
 def _ranking_table(found: Diagnosis, scale: float, unit: str) -> str:
     rows = []
     for row in found.ranking[:MOST_ROWS]:
-        values = parameters_in_words(row['parameters'])
+        values = parameters_in_words(row['effect'], row['parameters'])
         rows.append([linked(row['effect']), number(scale * row['rmse_after']),
                      f'{100.0 * row["gain"]:.0f} %', found.p_value(row),
                      f'{100.0 * row["absorbed"]:.0f} %', 'yes' if row['plausible'] else 'no',

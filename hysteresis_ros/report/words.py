@@ -179,12 +179,14 @@ def load_in_words(model: MuscleModel, theta: np.ndarray) -> str:
             'there')
 
 
-def parameters_in_words(parameters: Mapping, intervals: bool = True) -> str:
+def parameters_in_words(name: str, parameters: Mapping, intervals: bool = True) -> str:
     """
-    Write parameters with their units.
+    Write parameters of an effect with their units, but for those of forms that it does not have.
 
     Parameters
     ----------
+    name : str
+        The effect's identifier.
     parameters : mapping of str to mapping
         By name 'value', 'low', 'high' and 'unit', as `Effect.to_dict` gives them.
     intervals : bool
@@ -194,9 +196,16 @@ def parameters_in_words(parameters: Mapping, intervals: bool = True) -> str:
     -------
     str
     """
-    words = []
-    for name, entry in parameters.items():
-        text = f'{name} {entry["value"]:.3g}'
+    words, idle = [], set()
+    if name in catalogue():
+        effect = catalogue()[name](None, **{
+            own: entry['value'] for own, entry in parameters.items()})
+        idle = {parameter.name for parameter in effect.parameters
+                if effect.in_simplest_form(parameter)}
+    for own, entry in parameters.items():
+        if own in idle:
+            continue
+        text = f'{own} {entry["value"]:.3g}'
         if intervals and entry['low'] != entry['high']:
             text += f' ({entry["low"]:.3g} to {entry["high"]:.3g})'
         # 1 is the unit of what has none.
