@@ -162,15 +162,23 @@ class BenchSearch:
         return list(found.values())
 
     def _in_other_forms(self, fits: Sequence[Fit]) -> list[Fit]:
-        """Return the best fit of each size in the other forms that its effects can have."""
-        best: dict[int, Fit] = {}
-        for fit in sorted(fits, key=lambda one: self.fitter.error(one.predicted)):
+        """
+        Return fits in the other forms that their effects can have.
+
+        Of each size the best one, and what every loaded muscle has: in the simplest form it may be
+        behind what only stands for the form that it has.
+        """
+        chosen: dict[int, Fit] = {}
+        order = sorted(fits, key=lambda one: self.fitter.error(one.predicted))
+        for fit in order:
             if other_forms(fit.effects):
-                best.setdefault(len(fit.effects), fit)
+                chosen.setdefault(len(fit.effects), fit)
+        some = [*chosen.values(), *(fit for fit in order if not not_universal(fit)
+                                    and len(fit.effects) > 1 and fit not in chosen.values())]
         return self._in_parallel(_fitted, self.fitter, [
             [usual([effect], self.fitter.problem.kind)[0].with_values(**forms[effect.id])
              if effect.id in forms else effect for effect in fit.effects]
-            for fit in best.values() for forms in other_forms(fit.effects)])
+            for fit in some for forms in other_forms(fit.effects)])
 
     def _in_simplest_forms(self, fits: Sequence[Fit]) -> list[Fit]:
         """
