@@ -265,6 +265,27 @@ def test_a_fit_that_went_astray_is_found_again_from_the_equation_that_it_contain
     assert late.sets.fits[loss].log_evidence > astray.log_evidence + 900.0
 
 
+def test_an_equation_that_contains_more_is_fitted_in_the_place_of_two_effects(
+        model, monkeypatch):
+    """Of a lag and of what stands for what else the equation says."""
+    hidden = effect_of(model, 'heat_loss', time_constant=4.0, growth=0.5, linear=1.0)
+    measured = runs(model.with_effects([hidden]), rows=60, dt=1.0)
+    found = selection(model, measured, ('thermal_lag', 'heat_loss', 'supply_sag'))
+    loss = frozenset(['heat_loss'])
+    best = found.sets.fits[loss]
+    found.fitting.fit([[effect for name in ('thermal_lag', 'supply_sag')
+                        for effect in found.sets.fits[frozenset([name])].effects]])
+    pair = frozenset(['thermal_lag', 'supply_sag'])
+    astray, = found.fitter.fit([[hidden.with_values(time_constant=25.0)]],
+                               found.fitting.metric, 0)
+    found.sets.fits[loss] = found.fitter.along(astray)
+    found._exchanged.clear()
+    monkeypatch.setattr(found, '_to_exchange', lambda: (pair, []))
+    found._exchange()
+    assert found.sets.fits[loss].log_evidence == pytest.approx(best.log_evidence, abs=1.0)
+    assert found.sets.fits[loss].effects[0].linear == 1.0
+
+
 def test_either_of_two_effects_may_say_that_it_is_confused_with_the_other(model):
     """A payload says so of the sag, which says so of the fan alone."""
     names = ('payload_error', 'supply_sag', 'airflow', 'encoder_offset')

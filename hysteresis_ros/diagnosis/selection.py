@@ -324,6 +324,7 @@ class Selection:
                 return
             self._exchanged.add(names)
             whole = self.sets.fits[names]
+            self._fit_containing(whole)
             for out in (effect for effect in whole.effects if effect.id in exchanged):
                 others = [effect for effect in whole.effects if effect is not out]
                 for fit in self.fitter.fit([others], self.fitting.metric, 0):
@@ -358,6 +359,22 @@ class Selection:
         self.fitting.fit([*further, *(effects for names, effects in sets.items() if (
             names not in self.sets.fits or self.sets.fits[names].covariance is None))])
         self._test_singles()
+
+    def _fit_containing(self, whole: Fit) -> None:
+        """
+        Fit equations that contain that of one effect of a set in the place of it and of another.
+
+        What is more in such an equation may be what the other effect stands for.
+        """
+        sets = []
+        for effect in whole.effects:
+            for own in self._containing(effect):
+                others = [other for other in whole.effects if other is not effect]
+                sets += [[*(one for one in others if one is not other), *own] for other in others]
+        self.fitting.fit(sets)
+        if sets:
+            self.fitting.refine(len(whole.effects) - 1)
+            self._test_singles()
 
     def _containing(self, effect: Effect) -> list[list[Effect]]:
         """Return the effects whose equation contains that of an effect, with its values."""

@@ -90,7 +90,7 @@ class PwmDeadZone(ElectricalEffect):
         """Begin also with what is not stretched; where rows drop out no slope says where to go."""
         largest = self.parameters[0].high
         return [{'Vd': share * largest, 'above': above} for share, above in (
-            (0.5, self.VOLTAGE), (0.7, self.HEAT), (1.4, self.HEAT),
+            (0.07, self.VOLTAGE), (0.5, self.VOLTAGE), (0.3, self.HEAT), (1.4, self.HEAT),
             *((cut, self.ALL) for cut in self.CUTS))]
 
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
