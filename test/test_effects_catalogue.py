@@ -81,7 +81,7 @@ EXPECTED = {
 
 # Effect, parameter: unit and plausible range for a 0.2 mm wire on this arm.
 RANGES = {
-    ('supply_sag', 'Rs'): ('Ohm', 0.05, 2.0), ('pwm_dead_zone', 'Vd'): ('V', 0.05, 1.5),
+    ('supply_sag', 'Rs'): ('Ohm', 0.01, 2.0), ('pwm_dead_zone', 'Vd'): ('V', 0.05, 1.5),
     ('measured_supply', 'nominal'): ('V', 3.0, 60.0),
     ('thermal_lag', 'time_constant'): ('s', 0.03, 150.0),
     ('valve_lag', 'filling'): ('s', 0.03, 150.0), ('valve_lag', 'venting'): ('s', 0.03, 150.0),
@@ -95,7 +95,7 @@ RANGES = {
     ('cable_friction', 'mu_phi'): ('1', 0.005, 1.0),
     ('overload', 'Fy'): ('loads', 0.2, 5.0), ('overload', 'compliance'): ('mm/N', 0.1, 20.0),
     ('wire_break', 'time'): ('s', 1.0, 1e5),
-    ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 5., 100.),
+    ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 1., 100.),
     # A clamp of 50 g, too: the base model's own error alone may look like 10 g.
     ('clamp_mass', 'moment'): ('g m', 5.0 * 0.020, 50.0 * 0.050),
     ('geometry_error', 'dx'): ('mm', 0.5, 5.0), ('frame_tilt', 'phi'): ('deg', 1.0, 25.0),

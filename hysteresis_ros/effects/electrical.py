@@ -34,7 +34,7 @@ class SupplySag(ElectricalEffect):
     experiment = 'measure the voltage at the wire itself while it is heated'
     confused_with = ('airflow',)
     parameters = (
-        Parameter('Rs', 'Ohm', 'series resistance against a wire of 8 Ohm', 0.05, 2.0, 0.0,
+        Parameter('Rs', 'Ohm', 'series resistance against a wire of 8 Ohm', 0.01, 2.0, 0.0,
                   (0.3, 1.0), log=True),)
 
     WIRE_RESISTANCE = 8.0
