@@ -68,29 +68,27 @@ def test_less_than_nothing_stays_out_of_reach_behind_a_dead_zone():
     assert made.inverse(-2.0, ROOM, WIRE) < 0.0 == made.inverse(0.0, ROOM, WIRE)
 
 
-@pytest.mark.parametrize('above, arrives', [
-    (0.0, 2.4), (1.0, 2.0), (2.0, math.sqrt(8.0)), (3.0, 3.0)])
-def test_beyond_a_dead_zone_the_voltage_is_stretched_or_less_or_whole(above, arrives):
-    made = effect('pwm_dead_zone', Vd=1.0, above=above)
+@pytest.mark.parametrize('whole, arrives', [(0.0, 2.4), (1.0, 3.0)])
+def test_beyond_a_dead_zone_the_voltage_is_stretched_or_whole(whole, arrives):
+    made = effect('pwm_dead_zone', Vd=1.0, whole=whole)
     rows = made.forward(np.array([-1.0, 0.0, 0.999, 3.0]), ROOM, WIRE)
     np.testing.assert_allclose(rows[1:], [0.0, 0.0, arrives], rtol=1e-12)
     assert made.inverse(arrives, ROOM, WIRE) == pytest.approx(3.0, rel=1e-12)
 
 
 def test_between_nothing_and_a_whole_pulse_the_nearer_one_in_heat_is_set():
-    made = effect('pwm_dead_zone', Vd=2.0, above=3.0)
+    made = effect('pwm_dead_zone', Vd=2.0, whole=1.0)
     assert float(made.forward(2.0, ROOM, WIRE)) == 2.0 > float(made.forward(1.99, ROOM, WIRE))
     assert [made.inverse(wanted, ROOM, WIRE) for wanted in (-1.0, 0.0, 1.41, 1.42, 2.0, 2.5)] == [
         -1.0, 0.0, 0.0, 2.0, 2.0, 2.5]
 
 
-@pytest.mark.parametrize('above, largest', [
-    (0.0, 1.5), (1.0, 1.5), (2.0, 4.0), (3.0, 4.0)])
-def test_pulses_that_are_too_short_may_drop_out_further_up(above, largest):
-    odd = [effect('pwm_dead_zone', Vd=share * largest, above=above).implausible(0.15)
+@pytest.mark.parametrize('whole, largest', [(0.0, 1.5), (1.0, 4.0)])
+def test_pulses_that_arrive_whole_may_drop_out_further_up(whole, largest):
+    odd = [effect('pwm_dead_zone', Vd=share * largest, whole=whole).implausible(0.15)
            for share in (0.01, 1.1, 1.2)]
     assert odd[1:] == [[], ['Vd']]
-    assert odd[0] == ([] if above > 1.0 else ['Vd'])
+    assert odd[0] == ([] if whole else ['Vd'])
 
 
 def test_dead_zone_as_wide_as_the_range_stays_finite():

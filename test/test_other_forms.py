@@ -135,25 +135,20 @@ def test_heat_that_is_lost_otherwise_than_on_the_bench_is_heat_loss(monkeypatch,
     assert found.rmse_after < 0.4 * found.rmse_before
 
 
-@pytest.mark.parametrize('passes, above, below', [
-    (lambda voltage: voltage if voltage >= 3.6 else 0.0, 3.0, 3.6),
-    pytest.param(lambda voltage: math.sqrt(max(voltage ** 2 - 4.0, 0.0)), 2.0, 2.0, marks=LONG),
-    pytest.param(lambda voltage: max(voltage - 0.6, 0.0), 1.0, 0.6, marks=LONG)])
-def test_a_board_that_does_not_stretch_what_it_passes_has_a_dead_zone(
-        monkeypatch, passes, above, below):
-    """Pulses that drop out or lose their beginning, and a diode."""
+def test_pulses_that_drop_out_and_pass_whole_above_are_a_dead_zone(monkeypatch):
+    """No rest of them is stretched."""
     drive_squared = Conditions.drive_squared
 
     def otherwise(own, voltage, *others):
         dead, own.dead_voltage = own.dead_voltage, 0.0
-        found = drive_squared(own, passes(voltage) if dead else voltage, *others)
+        found = drive_squared(own, 0.0 if dead and voltage < 3.6 else voltage, *others)
         own.dead_voltage = dead
         return found
     monkeypatch.setattr(Conditions, 'drive_squared', otherwise)
     found = found_in({'pwm_dead_zone': 1.0}, 5, protocol='arm-steps', trials=(0, 1))
     assert (found.verdict, found.missing) == ('missing', ['pwm_dead_zone'])
-    assert found.effects[0].above == above
-    assert found.effects[0].Vd == pytest.approx(below, rel=0.1)
+    assert found.effects[0].whole == 1.0
+    assert found.effects[0].Vd == pytest.approx(3.6, rel=0.1)
 
 
 class Saturating(float):

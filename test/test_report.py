@@ -264,5 +264,5 @@ def test_the_words_of_values_have_units_and_intervals_where_there_are_any():
 def test_the_words_of_values_say_nothing_of_a_form_that_an_effect_does_not_have():
     values = effect_of(bicep_model(), 'pwm_dead_zone', Vd=0.4).to_dict()['parameters']
     assert parameters_in_words('pwm_dead_zone', values) == 'Vd 0.4 V'
-    values['above']['value'] = 2.0
-    assert parameters_in_words('pwm_dead_zone', values, False) == 'Vd 0.4 V, above 2'
+    values['whole']['value'] = 1.0
+    assert parameters_in_words('pwm_dead_zone', values, False) == 'Vd 0.4 V, whole 1'

@@ -57,18 +57,18 @@ class PwmDeadZone(ElectricalEffect):
     """
     Pulses too short to switch the transistor on.
 
-    What a board makes of longer pulses differs. Firmware may map the whole range of the setpoint to
-    the duties that do switch, so that nothing is lost at full drive; a diode takes its drop off;
-    each pulse may lose the time that switching takes, and with it as much heat at any duty; or
-    pulses pass whole as soon as they are longer than that. 3 us are 6 % of the period at 20 kHz,
-    and on 12 V that duty heats as 2.9 V do, so that pulses drop out far up.
+    Firmware may map the whole range of the setpoint to the duties that do switch, so that nothing
+    is lost at full drive; or pulses pass whole as soon as they are long enough. What takes 3 us to
+    switch is 6 % of the period at 20 kHz, and on 12 V that duty heats as 2.9 V do, so that pulses
+    drop out far up. What takes a voltage or a share of the heat off all of them is nearly the same
+    to an arm as `supply_sag` and `stress_dependence`, and is no form of this.
     """
 
     id = 'pwm_dead_zone'
     sentence = ('Below a smallest duty the board delivers nothing; above it the voltage is scaled, '
-                'or less, or whole.')
-    equation = ('Ve = 0 for V < Vd, else, by above, 0: (V - Vd) Vmax / (Vmax - Vd), Vmax the '
-                'largest of the bench; 1: V - Vd; 2: (V^2 - Vd^2)^(1/2); 3: V')
+                'or whole.')
+    equation = ('Ve = 0 for V < Vd, else (V - Vd) Vmax / (Vmax - Vd), Vmax the largest of the '
+                'bench; or, where whole is 1, V')
     source = 'switching and dead time of a PWM stage'
     shows_in = 'low V'
     experiment = 'fine steps of the voltage from 0 up'
@@ -76,36 +76,28 @@ class PwmDeadZone(ElectricalEffect):
     parameters = (
         Parameter('Vd', 'V', 'largest voltage that has no effect', 0.05, 1.5, 0.0, (0.3, 1.0),
                   log=True, scale='drive'),
-        Parameter('above', '1', 'what arrives above it: 0 the rest stretched to the full range, 1 '
-                  'the rest of the voltage, 2 the rest of the heat, 3 all', 0.0, 3.0, 0.0, (0.0,),
-                  choices=(0.0, 1.0, 2.0, 3.0), kinds=('arm',), form=True))
+        Parameter('whole', '1', 'what arrives above it, 0: the rest, stretched to the full range, '
+                  '1: all', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0), kinds=('arm',), form=True))
 
-    STRETCHED, VOLTAGE, HEAT, ALL = 0.0, 1.0, 2.0, 3.0
-    # Largest duty by which pulses may be too short, as the voltage over that of the other forms.
-    SHORT = 8.0 / 3.0
-    # Starts for what all arrives above, over the same: no further apart than a fit finds its way.
+    # Largest duty of pulses that drop out, as the voltage over that of a zone that is stretched.
+    LARGEST = 8.0 / 3.0
+    # Starts for what arrives whole above, over the same: no further apart than a fit finds its way.
     CUTS = tuple(0.8 * 1.1 ** step for step in range(13))
 
     def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
-        """Begin also with what is not stretched; where rows drop out no slope says where to go."""
-        largest = self.parameters[0].high
-        return [{'Vd': share * largest, 'above': above} for share, above in (
-            (0.07, self.VOLTAGE), (0.5, self.VOLTAGE), (0.3, self.HEAT), (1.4, self.HEAT),
-            *((cut, self.ALL) for cut in self.CUTS))]
+        """Begin also with pulses that drop out: no slope says where they do."""
+        return [{'Vd': cut * self.parameters[0].high, 'whole': 1.0} for cut in self.CUTS]
 
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
         """Name a zone that is too wide; see `Effect.implausible`."""
-        if self.above in (self.HEAT, self.ALL) and self.Vd <= (
-                (1.0 + slack) * self.SHORT * self.parameters[0].high):
+        if self.whole and self.Vd <= (1.0 + slack) * self.LARGEST * self.parameters[0].high:
             return []
         return super().implausible(slack, duration)
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
-        """Cut the lower end off, and more or less of the rest."""
-        if self.above == self.ALL:
+        """Cut the lower end off, and stretch the rest or not."""
+        if self.whole:
             return np.where(np.asarray(signal) < self.Vd, np.minimum(signal, 0.0), signal)
-        if self.above == self.HEAT:
-            return np.sqrt(np.maximum(np.maximum(signal, 0.0) ** 2 - self.Vd ** 2, 0.0))
         return np.maximum(signal - self.Vd, 0.0) * self._stretch(surroundings)
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
@@ -116,15 +108,11 @@ class PwmDeadZone(ElectricalEffect):
         """
         if signal <= 0.0:
             return signal
-        if self.above == self.ALL:
+        if self.whole:
             return max(signal, self.Vd) if 2.0 * signal ** 2 > self.Vd ** 2 else 0.0
-        if self.above == self.HEAT:
-            return math.hypot(signal, self.Vd)
         return signal / self._stretch(surroundings) + self.Vd
 
     def _stretch(self, surroundings: Surroundings) -> float:
-        if self.above == self.VOLTAGE:
-            return 1.0
         full = math.sqrt(surroundings.full_drive_squared)
         return full / max(full - self.Vd, 1e-3 * full)
 
