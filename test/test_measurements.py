@@ -159,6 +159,21 @@ def test_usual_values_and_a_name_that_is_almost_right():
     assert len(found) == 1 and "'Force' is not used; is 'force' meant" in found[0]
 
 
+@pytest.mark.parametrize('name, meant', [
+    ('supply', 'supply_voltage'), ('Supply_V', 'supply_voltage'),
+    ('ambient', 'ambient_temperature'), ('ambient_temp', 'ambient_temperature')])
+def test_a_column_with_the_first_word_of_a_known_name_is_asked_about(name, meant):
+    """It would be left out without a word, and with it what the supply or the room did."""
+    rows = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    found = Measurement.from_columns({**arm(), name: rows}).warnings
+    assert len(found) == 1 and f"{name!r} is not used; is '{meant}' meant" in found[0]
+
+
+@pytest.mark.parametrize('name', ['volts', 'note', 'am', ''])
+def test_other_columns_are_the_users_own(name):
+    assert not Measurement.from_columns({**arm(), name: [1.0] * 6}).warnings
+
+
 def test_a_missing_column_is_named_with_the_closest_one():
     table = Measurement.from_columns(arm(supply_volt=[1] * 6))
     with pytest.raises(MeasurementError, match="no column 'supply_voltage'; is 'supply_volt'"):

@@ -413,11 +413,17 @@ def name_warnings(measurement: Measurement) -> tuple[str, ...]:
     found = []
     for name in measurement.columns:
         if not is_known(name) and not name.startswith(('predicted_', 'reference_')):
-            meant = closest(name, absent, 0.8)
+            meant = closest(name, absent, 0.8) or _begins_as(name, absent)
             if meant:
                 found.append(f'{measurement.source}: column {name!r} is not used; '
                              f'is {meant!r} meant? Rename it')
     return tuple(found)
+
+
+def _begins_as(name: str, known: Iterable[str]) -> str | None:
+    """Return the name of several words of which this one has the first, as in `supply`."""
+    first = name.lower().split('_')[0]
+    return next((one for one in known if one.startswith(f'{first}_')), None)
 
 
 def is_known(name: str) -> bool:
