@@ -248,7 +248,7 @@ def test_effects_lists_and_explains(capsys, tmp_path):
     assert content['effects'][0]['parameters']['Rs']['scale'] == ''
     assert main(['effects', 'payload_error']) == 0
     text = ' '.join(capsys.readouterr().out.split())
-    assert "5 to 100 g (either sign) for the paper's muscle and arm, in proportion to mass" in text
+    assert "1 to 100 g (either sign) for the paper's muscle and arm, in proportion to mass" in text
     assert main(['effects', 'thermal_lag']) == 0
     text = capsys.readouterr().out
     assert 'equation:' in text and 'confused with:' in text and ' s' in text
