@@ -3,7 +3,6 @@
 """What is kept of the sets of effects that were fitted to a recording."""
 
 import dataclasses
-import math
 
 from model_support import bicep_model, effect_of, runs
 import numpy as np
@@ -47,22 +46,6 @@ def test_of_each_set_the_most_probable_fit_is_kept(fitter, sets):
         for fit in order:
             sets.keep(fit)
         assert sets.fits[NAMES] is good
-        sets.fits.clear()
-
-
-@pytest.mark.parametrize('ahead, chosen', [(0.5, 'physical'), (2.0, 'unphysical')])
-def test_what_is_not_physical_has_to_be_clearly_more_probable(fitter, sets, ahead, chosen):
-    """By as much as what is reported may be less probable than the answer, whichever is first."""
-    fit = fitted(fitter)
-    payload, = fit.effects
-    least = -sets.temper * math.log(sets.settings.reported)
-    fits = {'physical': fit, 'unphysical': dataclasses.replace(
-        fit, effects=[payload.with_values(dm=300.0)],
-        log_evidence=fit.log_evidence + ahead * least)}
-    for order in (('physical', 'unphysical'), ('unphysical', 'physical')):
-        for name in order:
-            sets.keep(fits[name])
-        assert sets.fits[NAMES] is fits[chosen]
         sets.fits.clear()
 
 

@@ -94,20 +94,10 @@ class FittedSets:
         return self.fits[frozenset()]
 
     def keep(self, fit: Fit) -> None:
-        """
-        Keep a fit where it is the best of its effects.
-
-        One whose values are not physical has to be clearly more probable than one whose are: else
-        it is the noise that has moved them there.
-        """
+        """Keep a fit where it is the best of its effects."""
         names = frozenset(fit.names)
-        if names not in self.fits or self._worth(fit) > self._worth(self.fits[names]):
+        if names not in self.fits or fit.log_evidence > self.fits[names].log_evidence:
             self.fits[names] = fit
-
-    def _worth(self, fit: Fit) -> float:
-        """Return a fit's log evidence, less what would be clear if its values are not physical."""
-        unphysical = math.log(self.settings.reported) if fit.implausible() else 0.0
-        return fit.log_evidence + self.temper * unphysical
 
     def judge_all(self) -> None:
         """Judge all fits under the covariances that are at hand now."""
