@@ -173,8 +173,9 @@ class BenchSearch:
         for fit in order:
             if other_forms(fit.effects):
                 chosen.setdefault(len(fit.effects), fit)
-        some = [*chosen.values(), *(fit for fit in order if not not_universal(fit)
-                                    and len(fit.effects) > 1 and fit not in chosen.values())]
+        some = [*chosen.values(), *(fit for fit in order if len(fit.effects) > 1
+                                    and not not_universal(fit)
+                                    and fit is not chosen.get(len(fit.effects)))]
         return self._in_parallel(_fitted, self.fitter, [
             [usual([effect], self.fitter.problem.kind)[0].with_values(**forms[effect.id])
              if effect.id in forms else effect for effect in fit.effects]
