@@ -266,3 +266,7 @@ def test_the_words_of_values_say_nothing_of_a_form_that_an_effect_does_not_have(
     assert parameters_in_words('pwm_dead_zone', values) == 'Vd 0.4 V'
     values['whole']['value'] = 1.0
     assert parameters_in_words('pwm_dead_zone', values, False) == 'Vd 0.4 V, whole 1'
+    # Of an effect of the user's own, which is in no catalogue, all are written.
+    assert parameters_in_words('my_own', values, False) == 'Vd 0.4 V, whole 1'
+    values['whole']['value'] = 0.0
+    assert parameters_in_words('my_own', values, False) == 'Vd 0.4 V, whole 0'
