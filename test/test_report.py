@@ -254,19 +254,23 @@ def test_an_effect_is_not_both_ranked_and_one_that_could_not_have_shown():
 def test_the_words_of_values_have_units_and_intervals_where_there_are_any():
     values = {'B': {'value': 1.2345, 'low': 1.1, 'high': 1.5, 'unit': 'deg'},
               'seat': {'value': -1.0, 'low': -1.0, 'high': -1.0, 'unit': '1'},
-              'zeroed': {'value': 1.0, 'low': 1.0, 'high': 1.0, 'unit': '1'}}
+              'zeroed': {'value': 0.5, 'low': 0.5, 'high': 0.5, 'unit': '1'}}
     assert (parameters_in_words('backlash', values)
-            == 'B 1.23 (1.1 to 1.5) deg, seat -1, zeroed 1')
+            == 'B 1.23 (1.1 to 1.5) deg, seat -1, zeroed 0.5')
     assert (parameters_in_words('backlash', values, intervals=False)
-            == 'B 1.23 deg, seat -1, zeroed 1')
+            == 'B 1.23 deg, seat -1, zeroed 0.5')
 
 
-def test_the_words_of_values_say_nothing_of_a_form_that_an_effect_does_not_have():
-    values = effect_of(bicep_model(), 'pwm_dead_zone', Vd=0.4).to_dict()['parameters']
-    assert parameters_in_words('pwm_dead_zone', values) == 'Vd 0.4 V'
-    values['whole']['value'] = 1.0
-    assert parameters_in_words('pwm_dead_zone', values, False) == 'Vd 0.4 V, whole 1'
-    # Of an effect of the user's own, which is in no catalogue, all are written.
-    assert parameters_in_words('my_own', values, False) == 'Vd 0.4 V, whole 1'
-    values['whole']['value'] = 0.0
-    assert parameters_in_words('my_own', values, False) == 'Vd 0.4 V, whole 0'
+def test_the_words_of_values_say_nothing_of_what_is_neutral_and_was_not_fitted():
+    values = effect_of(bicep_model(), 'stress_dependent_strain', r=0.4).to_dict()['parameters']
+    values['F0'].update(value=2.0, low=1.0, high=3.0)
+    assert (parameters_in_words('stress_dependent_strain', values)
+            == 'r 0.4, F0 2 (1 to 3) loads')
+    values['hot'].update(value=1.0, low=1.0, high=1.0)
+    values['growth'].update(low=-0.1, high=0.1)
+    assert (parameters_in_words('stress_dependent_strain', values)
+            == 'r 0.4, F0 2 (1 to 3) loads, growth 0 (-0.1 to 0.1), hot 1')
+    # The size is always written, and all values of an effect that no catalogue has.
+    size = {'offset': {'value': 0.0, 'low': 0.0, 'high': 0.0, 'unit': 'deg'}}
+    assert parameters_in_words('encoder_offset', size) == 'offset 0 deg'
+    assert parameters_in_words('my_own', size) == 'offset 0 deg'

@@ -32,7 +32,7 @@ class ParameterVector:
         self.entries = [(index, parameter) for index, effect in enumerate(self.effects)
                         for parameter in effect.parameters
                         if kind in parameter.kinds and not parameter.choices
-                        and not effect.in_simplest_form(parameter)]
+                        and not _in_simplest_form(effect, parameter)]
         self.lower, self.upper = (
             np.array([_to_unit(parameter, parameter.bounds[side])
                       for _, parameter in self.entries]) for side in (0, 1))
@@ -88,6 +88,13 @@ class ParameterVector:
             effects[index].intervals[parameter.name] = (
                 _from_unit(parameter, float(low)), _from_unit(parameter, float(high)))
         return effects
+
+
+def _in_simplest_form(effect: Effect, parameter: Parameter) -> bool:
+    """Whether a parameter tells forms apart, or belongs to a form, and the form is neutral."""
+    form = parameter.name if parameter.form else parameter.with_form
+    return any(other.name == form and effect.values[form] == other.neutral
+               for other in effect.parameters)
 
 
 def _unit(parameter: Parameter) -> float:

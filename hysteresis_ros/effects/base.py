@@ -326,12 +326,6 @@ class Effect(abc.ABC):
         other._begin(self.values, values)
         return other
 
-    def in_simplest_form(self, parameter: Parameter) -> bool:
-        """Whether a parameter tells forms apart, or belongs to a form, and the form is neutral."""
-        form = parameter.name if parameter.form else parameter.with_form
-        return any(other.name == form and self.values[form] == other.neutral
-                   for other in self.parameters)
-
     def with_parameter(self, name: str, **changes: Any) -> 'Effect':
         """Return a copy, one of whose parameters is described otherwise."""
         other = self.with_values()

@@ -181,7 +181,7 @@ def load_in_words(model: MuscleModel, theta: np.ndarray) -> str:
 
 def parameters_in_words(name: str, parameters: Mapping, intervals: bool = True) -> str:
     """
-    Write parameters of an effect with their units, but for those of forms that it does not have.
+    Write parameters of an effect with their units, but for those that are neutral and not fitted.
 
     Parameters
     ----------
@@ -196,14 +196,12 @@ def parameters_in_words(name: str, parameters: Mapping, intervals: bool = True) 
     -------
     str
     """
-    words, idle = [], set()
-    if name in catalogue():
-        effect = catalogue()[name](None, **{
-            own: entry['value'] for own, entry in parameters.items()})
-        idle = {parameter.name for parameter in effect.parameters
-                if effect.in_simplest_form(parameter)}
+    words = []
+    # All but the first, which is the effect's size.
+    further = catalogue()[name].parameters[1:] if name in catalogue() else ()
+    neutral = {parameter.name: parameter.neutral for parameter in further}
     for own, entry in parameters.items():
-        if own in idle:
+        if entry['value'] == entry['low'] == entry['high'] == neutral.get(own):
             continue
         text = f'{own} {entry["value"]:.3g}'
         if intervals and entry['low'] != entry['high']:
