@@ -243,7 +243,7 @@ def late(model):
 def test_an_equation_begins_also_where_the_one_that_it_contains_has_ended(late):
     """With all forms that it has, once each."""
     lag, = late.sets.fits[frozenset(['thermal_lag'])].effects
-    starts = [own for own, in late._containing(lag)]
+    starts = late._containing(lag)
     assert {own.id for own in starts} == set(LAGS[1:])
     assert {own.time_constant for own in starts} == {lag.time_constant}
     assert {own.linear for own in starts if own.id == 'heat_loss'} == {0.0, 0.5, 0.65, 1.0}

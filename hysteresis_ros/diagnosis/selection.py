@@ -354,7 +354,7 @@ class Selection:
                 effect, = self.sets.fits[names].effects
                 for effects in self._confused_with([], singles, effect):
                     sets[_names(effects)] = effects
-                further += self._containing(effect)
+                further += [[own] for own in self._containing(effect)]
         # One that could not be begun may be fitted from another start.
         self.fitting.fit([*further, *(effects for names, effects in sets.items() if (
             names not in self.sets.fits or self.sets.fits[names].covariance is None))])
@@ -370,18 +370,18 @@ class Selection:
         for effect in whole.effects:
             for own in self._containing(effect):
                 others = [other for other in whole.effects if other is not effect]
-                sets += [[*(one for one in others if one is not other), *own] for other in others]
+                sets += [[*(one for one in others if one is not other), own] for other in others]
         self.fitting.fit(sets)
         if sets:
             self.fitting.refine(len(whole.effects) - 1)
             self._test_singles()
 
-    def _containing(self, effect: Effect) -> list[list[Effect]]:
+    def _containing(self, effect: Effect) -> list[Effect]:
         """Return the effects whose equation contains that of an effect, with its values."""
         found = [start.effect.with_values(**{name: value for name, value in effect.values.items()
                                              if name in start.effect.values})
                  for start in self.alone.starts if effect.id in start.effect.replaces]
-        return list({(own.id, *own.values.values()): [own] for own in found}.values())
+        return list({(own.id, *own.values.values()): own for own in found}.values())
 
     def _best_with(self, others: Sequence[Effect],
                    scored: Mapping[tuple[str, ...], tuple[float, list[Effect]]], out: str
