@@ -85,6 +85,26 @@ def test_no_vector_leads_out_of_the_bounds(name, numbers):
         assert low - slack <= effect.values[parameter.name] <= high + slack
 
 
+@pytest.mark.parametrize('name, values', [
+    ('payload_error', {'dm': 3.0}), ('payload_error', {'dm': -3.0}), ('airflow', {'beta': 0.97}),
+    ('airflow', {'beta': 1.03}), ('supply_sag', {'Rs': 0.08}), ('resistance_change', {'eta': 0.02}),
+    ('resistance_change', {'eta': -0.02})])
+def test_what_changes_little_is_near_a_start(model, name, values):
+    """Linearised where it changes the angle by ten times as much it scores behind all others."""
+    fitter = fitter_of(model, noisy(model))
+    base = fitter.problem.simulate([])
+    true = effect_of(model, name, **values)
+    change = fitter.problem.simulate([true]) - base
+    starts = linearised_starts(
+        fitter, Fit([], np.zeros(0), base, np.zeros((len(base), 0))), [name])
+    parameters = ParameterVector([true], 'arm')
+    mean, spread = parameters.prior()
+    off = [np.std(start.change + start.columns @ ((parameters.vector() - mean) / spread) - change)
+           for start in starts if all(start.effect.values[other.name] == true.values[other.name]
+                                      for other in true.parameters if other.choices)]
+    assert min(off) < 0.5 * np.std(change)
+
+
 def test_vectors_of_two_effects_stay_apart():
     """Each component moves its own effect and no other."""
     model = bicep_model()

@@ -121,8 +121,8 @@ class PayloadError(MechanismEffect):
     experiment = 'put the payload on a scale'
     confused_with = ('frame_tilt', 'supply_sag')
     parameters = (
-        Parameter('dm', 'g', 'payload above the assumed one', 1.0, 100.0, 0.0, (-20.0, 20.0),
-                  both_signs=True, scale='mass'),)
+        Parameter('dm', 'g', 'payload above the assumed one', 1.0, 100.0, 0.0,
+                  (-20.0, -5.0, 5.0, 20.0), both_signs=True, scale='mass'),)
 
     def forward(self, statics: Statics, geometry: BicepGeometry) -> Statics:
         """Add the weight's moment."""

@@ -46,8 +46,8 @@ class Airflow(ThermalEffect):
     experiment = 'switch the fan and watch gain and time constant change together'
     confused_with = ('supply_sag',)
     parameters = (
-        Parameter('beta', '1', 'heat transfer over that of the bench', 0.5, 3.0, 1.0, (0.8, 1.3),
-                  log=True),)
+        Parameter('beta', '1', 'heat transfer over that of the bench', 0.5, 3.0, 1.0,
+                  (0.8, 0.96, 1.04, 1.3), log=True),)
 
     @property
     def exchange(self) -> float:    # type: ignore[override]
