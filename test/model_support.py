@@ -34,7 +34,7 @@ STRENGTHS = {
     'r_phase': {'strain': 0.2, 'position': 0.2, 'width': 0.05},
     'creep': {'c': 0.1, 't0': 3.0}, 'viscoelastic_creep': {'J': 0.1, 't0': 10.0},
     'fatigue': {'b': 0.05, 'a': 0.02}, 'slack': {'Ls': 0.5},
-    'formation_memory': {'kept': 0.8}, 'cold_clamps': {'share': 0.1},
+    'formation_memory': {'kept': 0.8}, 'kinetics': {'share': 0.8}, 'cold_clamps': {'share': 0.1},
     'unequal_muscles': {'shorter': 0.6, 'longer': 0.9}, 'coulomb_friction': {'tau_c': 0.02},
     'cable_friction': {'mu_phi': 0.1}, 'wire_break': {'time': 20.0},
     'viscous_friction': {'b': 0.5}, 'inertia': {'I': 0.01},

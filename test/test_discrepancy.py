@@ -27,7 +27,7 @@ def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
     gain = discrepancy.sensitivity(problem, [])
     predicted = problem.simulate([])
     history = load_history(problem, [])
-    found = discrepancy.discrepancy_along(problem, [], predicted, Settings()).matrix()
+    found = discrepancy.discrepancy_along(problem, [], predicted, Settings()).matrix(courses=False)
     assert np.diag(found) == pytest.approx(
         (0.0004 * gain) ** 2 + history.path ** 2)
     assert found == pytest.approx(found.T)
@@ -51,30 +51,37 @@ def test_what_martensite_may_keep_of_its_load_is_an_error_of_all_rows_together(n
                       - problem.simulate([growth]) for kept in (0.5, 1.0))
     assert np.std(all_kept) > 1e-3
     assert found.kept == pytest.approx(all_kept) and found.common.size == 0
-    assert found.matrix() - found.matrix(kept=False) == pytest.approx(
-        np.outer(all_kept, all_kept) / 3.0)
+    assert found.matrix() - found.matrix(courses=False) == pytest.approx(
+        (np.outer(all_kept, all_kept) + np.outer(found.kinetics, found.kinetics)) / 3.0)
     assert half == pytest.approx(0.5 * all_kept, abs=0.1 * np.abs(all_kept).max())
     known = discrepancy.discrepancy_along(
         problem, [growth], problem.simulate([growth]), Settings(), ['formation_memory'])
     assert found.parts == pytest.approx(known.parts) and not np.any(known.kept)
     assert found.size ** 2 - known.size ** 2 == pytest.approx(np.mean(all_kept ** 2) / 3.0)
-    assert found.size_besides_kept == known.size
+    assert found.size_besides_courses == known.size_besides_courses
 
 
-def test_what_is_left_besides_kept_strain_lacks_a_share_from_none_to_all():
+def test_besides_what_has_one_course_the_residual_lacks_a_share_from_none_to_all():
     model = bicep_model()
     growth = effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)
     problem = problem_for(model.with_effects([growth]), [runs(model)])
     found = discrepancy.discrepancy_along(
         problem, [growth], problem.simulate([growth]), Settings())
+    assert np.all(np.std(found.courses, axis=0) > 1e-3)
     other = np.cos(np.arange(len(found.kept)))
+    other -= found.courses @ np.linalg.lstsq(found.courses, other, rcond=None)[0]
+    for shares in ((0.4, 0.7), (0.4, 0.0), (0.0, 1.0)):
+        residual = found.courses @ shares + other
+        assert found.shares(residual) == pytest.approx(shares, abs=1e-9)
+        assert found.besides_courses(residual) == pytest.approx(other)
+    alone = dataclasses.replace(found, kinetics=0.0 * found.kinetics)
     other -= (found.kept @ other) / (found.kept @ found.kept) * found.kept
     for share, left in ((0.4, 0.0), (1.5, 0.5), (-0.5, -0.5)):
         residual = share * found.kept + other
-        assert found.besides_kept(residual) == pytest.approx(left * found.kept + other)
-    plain = problem_for(model, [runs(model)])
-    nothing = discrepancy.discrepancy_along(plain, [], plain.simulate([]), Settings())
-    assert nothing.besides_kept(other) == pytest.approx(other) and nothing.kept_share(other) == 0.0
+        assert alone.besides_courses(residual) == pytest.approx(left * found.kept + other)
+    nothing = dataclasses.replace(alone, kept=0.0 * found.kept)
+    assert nothing.besides_courses(other) == pytest.approx(other)
+    assert nothing.shares(other).tolist() == [0.0, 0.0]
 
 
 def test_a_muscle_without_martensite_keeps_nothing(monkeypatch):
@@ -99,13 +106,14 @@ def test_what_may_be_kept_is_no_discrepancy_where_it_is_an_effect(fitted):
     found = discrepancy.discrepancy_along(
         problem, effects, problem.simulate(effects), Settings(),
         () if fitted else ('slack', 'formation_memory'))
-    assert np.diag(found.matrix()) == pytest.approx((0.0004 * gain) ** 2 + history.path ** 2)
+    assert np.diag(found.matrix(courses=False)) == pytest.approx(
+        (0.0004 * gain) ** 2 + history.path ** 2)
 
 
 def test_errors_of_rows_that_are_near_on_the_way_and_in_response_are_alike(problem):
     """More so on the same way of the drive than on the way back."""
     predicted, settings = problem.simulate([]), Settings()
-    found = discrepancy.discrepancy_along(problem, [], predicted, settings).matrix()
+    found = discrepancy.discrepancy_along(problem, [], predicted, settings).matrix(courses=False)
     size = np.sqrt(np.diag(found))
     drive, direction = problem.signals['drive'], problem.signals['direction'] > 0.0
     way = discrepancy.way_done(drive, predicted, problem.trial)
@@ -191,7 +199,7 @@ def test_the_discrepancy_follows_the_load(problem):
     problem = problem_for(model, [runs(model)])
     gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
     found = np.diag(discrepancy.discrepancy_along(
-        problem, [], problem.simulate([]), Settings()).matrix())
+        problem, [], problem.simulate([]), Settings()).matrix(courses=False))
     error = discrepancy.length_errors(model, load)
     assert np.ptp(error) > 1e-5
     assert found == pytest.approx(
@@ -225,7 +233,7 @@ def test_the_discrepancy_is_larger_where_the_muscle_transforms(problem):
     problem = problem_for(model, [runs(model)])
     gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
     found = np.diag(discrepancy.discrepancy_along(
-        problem, [], problem.simulate([]), Settings()).matrix())
+        problem, [], problem.simulate([]), Settings()).matrix(courses=False))
     relative = discrepancy.relative_errors(model, history.martensite)
     assert relative.max() - relative.min() > 0.5
     assert found == pytest.approx((4e-4 * gain * relative) ** 2 + history.path ** 2)
@@ -290,7 +298,8 @@ def test_where_the_strain_does_not_grow_with_the_load_nothing_is_kept():
 
     def largest(model):
         problem = problem_for(model, [moving])
-        return np.abs(discrepancy.formation_change(problem, model.effects)).max()
+        return np.abs(discrepancy.course_of(
+            discrepancy.FormationMemory, problem, model.effects)).max()
 
     assert largest(model) == 0.0
     assert largest(grown) > 1e-3

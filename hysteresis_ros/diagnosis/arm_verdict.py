@@ -19,11 +19,13 @@ import numpy as np
 
 from hysteresis_ros.diagnosis import events, significance, verdict
 from hysteresis_ros.diagnosis.fitted_sets import rms
-from hysteresis_ros.diagnosis.kept_strain import kept_strain
+from hysteresis_ros.diagnosis.not_on_bench import not_on_bench
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.residual import unexplained_signal
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.effects import catalogue, Effect
+from hysteresis_ros.effects.formation_memory import FormationMemory
+from hysteresis_ros.effects.kinetics import Kinetics
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_problem import ArmProblem
@@ -88,8 +90,8 @@ class _Verdict:
         before, after = (self.fitter.error(fit.held_out) for fit in fits)
         effects = self._in_order(self.fitter.with_intervals(self.sets.fits[chosen]))
         missing = [effect.id for effect in effects]
-        kept = None if unknown else kept_strain(selection, self.sets.fits[chosen])
-        to_add = missing or resembles or explains_most or ([kept['effect']] if kept else [])
+        besides = {} if unknown else not_on_bench(selection, self.sets.fits[chosen])
+        to_add = missing or resembles or explains_most or list(besides)
         happened = event if unknown and event_log > self._log_mass(valid) else None
         return verdict.Diagnosis(
             verdict=kind, missing=missing,
@@ -106,7 +108,7 @@ class _Verdict:
             uneven=unknown and self.sets.uneven(chosen),
             signal=unexplained_signal(problem, problem.measured - self.sets.fits[
                 chosen].predicted) if unknown else '',
-            kept_strain=kept)
+            kept_strain=besides.get(FormationMemory.id), kinetics=besides.get(Kinetics.id))
 
     def _single_row(self, best: frozenset[str]) -> float | None:
         """

@@ -123,7 +123,7 @@ class Covariance:
     ----------
     discrepancy : Discrepancy
     size : float
-        Root mean square of the discrepancy, but for what martensite keeps: that has one course.
+        Root mean square of the discrepancy, but for what has one course.
     points : list of Point
         Covariances at hand; see `add`.
     """
@@ -135,7 +135,7 @@ class Covariance:
         self._trials = [slice(*pair) for pair in zip(edges, edges[1:])]
         self._gaps = [np.abs(clock[own, None] - clock[own]) for own in self._trials]
         self._spread = scale_spread
-        self.size = discrepancy.size_besides_kept
+        self.size = discrepancy.size_besides_courses
         span = max(*(float(np.max(gaps)) for gaps in self._gaps), _TINY)
         steps = np.diff(clock)[np.diff(trial) == 0]
         shortest = max(float(np.median(steps)), 1e-9 * span) if len(steps) else span
@@ -236,7 +236,7 @@ class Covariance:
         return found
 
     def largest_error(self, rng: np.random.Generator, count: int, level: float = 0.95,
-                      kept: bool = True) -> float:
+                      courses: bool = True) -> float:
         """
         Return the root mean square error that the discrepancy stays below, at a probability.
 
@@ -247,15 +247,15 @@ class Covariance:
             Number of draws.
         level : float
             The probability.
-        kept : bool
-            Whether what martensite keeps counts.
+        courses : bool
+            Whether what has one course counts.
 
         Returns
         -------
         float
             In the unit of the response.
         """
-        values, vectors = linalg.eigh(self.discrepancy.matrix(kept))
+        values, vectors = linalg.eigh(self.discrepancy.matrix(courses))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         draws = root @ rng.standard_normal((len(values), count))
         scale = np.exp(self._spread * rng.standard_normal(count))

@@ -17,6 +17,9 @@ It is known before the arm moves. With effects, their equations may be off as we
   that. One of them feels the present load alone (`load_history`). In another one martensite keeps
   the strain of the load under which it formed: a share that is the same for the whole wire, so that
   all rows err together; but where that effect is tried, it speaks for itself.
+* A bench goes through few minor loops, which weights can follow whatever their kind. In one more
+  model that agrees with it, what transforms is in proportion to what has still to (`kinetics`); by
+  what share it is right is the same for all rows, too.
 * Every room warms up and cools down. Where that was recorded, its course is known and only its size
   is not. As long as it is less than the errors above, it is one of them, and no answer; what moves
   the arm by more is what `ambient_temperature` is for.
@@ -30,12 +33,14 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.effects import Effect, Inputs, MaterialEffect, Parameter, Surroundings
 from hysteresis_ros.effects.ambient import AmbientTemperature
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.formation_memory import FormationMemory
+from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.measurements.metrics import halfway
 from hysteresis_ros.measurements.way import unit, way_done
 
@@ -46,8 +51,10 @@ if TYPE_CHECKING:
 
 # The error that differs between the directions of the drive, against the common one.
 DIRECTIONAL = 0.5
-# Share of its strain that martensite keeps, root mean square: from none to all, each as likely.
-KEPT = 1.0 / math.sqrt(3.0)
+# A share of which nothing is known, root mean square: from none to all, each as likely.
+SHARE = 1.0 / math.sqrt(3.0)
+# Effects of which no bench tells the share, as `Discrepancy.courses` has them.
+COURSES: tuple[type[Effect], ...] = (FormationMemory, Kinetics)
 # By how much the full drive heats a muscle above the room [K], about.
 FULL_HEAT = 80.0
 # Of as many loads one lies between others, and tells what the model does between them.
@@ -77,6 +84,8 @@ class Discrepancy:
     kept : ndarray, shape (n,)
         What the response would change by if martensite kept all of its strain. A share of it, from
         none to all, is an error of all rows together.
+    kinetics : ndarray, shape (n,)
+        The same if all of it followed the kinetics of `Kinetics`.
     equations : ndarray, shape (n, e)
         The same as `parts`, for the equations of effects.
     """
@@ -85,40 +94,50 @@ class Discrepancy:
     places: np.ndarray
     common: np.ndarray
     kept: np.ndarray
+    kinetics: np.ndarray
     equations: np.ndarray
+
+    @property
+    def courses(self) -> np.ndarray:
+        """What has one course, and a share that is not known: `kept` and `kinetics`, (n, 2)."""
+        return np.column_stack([self.kept, self.kinetics])
 
     @property
     def size(self) -> float:
         """Root mean square of the base model's own error, in the unit of the response."""
-        return float(np.hypot(self.size_besides_kept, KEPT * np.sqrt(np.mean(self.kept ** 2))))
+        return math.hypot(self.size_besides_courses, SHARE * math.sqrt(
+            np.mean(np.sum(self.courses ** 2, axis=1))))
 
     @property
-    def size_besides_kept(self) -> float:
-        """The same without what martensite keeps."""
+    def size_besides_courses(self) -> float:
+        """The same without what has one course."""
         return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1)
                                      + np.sum(self.common ** 2, axis=1))))
 
-    def kept_share(self, residual: np.ndarray) -> float:
-        """Return the share of `kept`, from 0 to 1, that explains most of a residual (n,)."""
-        square = float(self.kept @ self.kept)
-        return float(np.clip(self.kept @ residual / square, 0.0, 1.0)) if square else 0.0
+    def shares(self, residual: np.ndarray) -> np.ndarray:
+        """Return the shares (2,) of the `courses`, 0 to 1, that explain most of a residual (n,)."""
+        found, acting = np.zeros(self.courses.shape[1]), np.any(self.courses, axis=0)
+        if np.any(acting):
+            found[acting] = lsq_linear(
+                self.courses[:, acting], residual, (0.0, 1.0), method='bvls').x
+        return found
 
-    def besides_kept(self, residual: np.ndarray) -> np.ndarray:
-        """Return a residual (n,) without the share of `kept` that explains most of it."""
-        return residual - self.kept_share(residual) * self.kept
+    def besides_courses(self, residual: np.ndarray) -> np.ndarray:
+        """Return a residual (n,) without the shares of the `courses` that explain most of it."""
+        return residual - self.courses @ self.shares(residual)
 
     def of_model_alone(self) -> Discrepancy:
         """Return the base model's own error, as if all equations of effects were exact."""
         return dataclasses.replace(self, equations=self.equations[:, :0])
 
-    def matrix(self, kept: bool = True) -> np.ndarray:
-        """Return the covariance, shape (n, n); without what martensite keeps if not `kept`."""
+    def matrix(self, courses: bool = True) -> np.ndarray:
+        """Return the covariance, shape (n, n); without what has one course if not `courses`."""
         squares = np.sum(self.places ** 2, axis=1)
         gaps = squares[:, None] + squares[None, :] - 2.0 * self.places @ self.places.T
         parts = np.hstack([self.parts, self.equations])
         known = (self.common @ self.common.T
                  + (parts @ parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0)))
-        return known + KEPT ** 2 * np.outer(self.kept, self.kept) if kept else known
+        return known + SHARE ** 2 * self.courses @ self.courses.T if courses else known
 
 
 class Offset(MaterialEffect):
@@ -235,9 +254,9 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     """
     Return the base model's own error of the angle, along the way that the arm takes.
 
-    How much strain martensite keeps is not known from the bench. Where `formation_memory` is in the
-    model or tried, its parameter stands for that, and a set without it says that nothing is kept;
-    otherwise anything from none to all may be.
+    How much strain martensite keeps, and how much of it follows its kinetics, is not known from the
+    bench. Where `formation_memory` or `kinetics` is in the model or tried, its parameter stands for
+    that, and a set without it says that it is none; otherwise anything from none to all may be.
 
     Parameters
     ----------
@@ -269,28 +288,35 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     common = left_out_changes(problem, effects)
     if room:
         common = np.column_stack([common, room_change(problem, effects)])
-    known = (FormationMemory.id in {*tried, *(effect.id for effect in effects)}
-             or not FormationMemory.available(problem.model.surroundings))
+    known = {*tried, *(effect.id for effect in effects)}
+    kept, kinetics = (
+        np.zeros(len(predicted)) if kind.id in known or not kind.available(
+            problem.model.surroundings) else course_of(kind, problem, effects)
+        for kind in COURSES)
     return Discrepancy(
         parts, np.column_stack([way_done(drive, predicted, problem.trial), unit(predicted)])
         / settings.correlation, common,
-        np.zeros(len(predicted)) if known else formation_change(problem, effects),
-        np.zeros((len(predicted), 0)))
+        kept, kinetics, np.zeros((len(predicted), 0)))
 
 
-def formation_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """
-    Return what the response would change by if martensite kept all of its strain, shape (n,).
+    Return what the response would change by if all of the wire did what one of `COURSES` says.
 
     Parameters
     ----------
+    kind : type of Effect
     problem : ArmProblem
         Rows and model.
     effects : sequence of Effect
-        All effects of the model, `formation_memory` not among them.
+        All effects of the model, none of this kind among them.
+
+    Returns
+    -------
+    ndarray, shape (n,)
     """
-    return _change_by(
-        FormationMemory(problem.model.surroundings, kept=1.0), problem, effects)
+    size, = kind.parameters
+    return _change_by(kind(problem.model.surroundings, **{size.name: 1.0}), problem, effects)
 
 
 def _change_by(effect: Effect, problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
@@ -325,7 +351,7 @@ def left_out_changes(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarr
 def room_is_calm(problem: ArmProblem, discrepancy: Discrepancy) -> bool:
     """Return whether what the recorded room does is less than the model's own error without it."""
     change = room_change(problem, problem.model.effects)
-    return 0.0 < float(np.sqrt(np.mean(change ** 2))) < discrepancy.size_besides_kept
+    return 0.0 < float(np.sqrt(np.mean(change ** 2))) < discrepancy.size_besides_courses
 
 
 def room_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

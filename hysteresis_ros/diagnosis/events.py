@@ -51,7 +51,7 @@ def most_probable(problem: ArmProblem, selection: Selection) -> tuple[float | No
     prior = max(float(np.mean(residual ** 2)), 1e-300)
     best, moment = -np.inf, rows[0]
     # As any effect, it has to explain more than the base model's own error.
-    own = selection.covariance.discrepancy.besides_kept(residual)
+    own = selection.covariance.discrepancy.besides_courses(residual)
     large = [_explained(own, steps * shape[:, None]) > selection.covariance.size ** 2
              for shape in shapes]
     for point in selection.covariance.points:

@@ -155,10 +155,10 @@ class FittedSets:
 
     def own_error(self, names: frozenset[str]) -> float:
         """
-        Return the RMSE of a set without the share that what martensite keeps can explain.
+        Return the RMSE of a set without the shares of what has one course (`Discrepancy.courses`).
 
-        What is kept is known but for that share, so that it hides nothing of another course: the
-        base model may be wrong by much and still miss nothing by little.
+        That is known but for its share, so that it hides nothing of another course: the base model
+        may be wrong by much and still miss nothing by little.
         """
         return self._errors_of(names)[2]
 
@@ -169,7 +169,7 @@ class FittedSets:
         if known is None or known[0] is not fit.predicted:
             least = self._least[names] if names in self._least else self.fitter.towards_least(fit)
             residuals = [self.problem.measured - one for one in (fit.predicted, least)]
-            own = map((fit.covariance or self.covariance).discrepancy.besides_kept, residuals)
+            own = map((fit.covariance or self.covariance).discrepancy.besides_courses, residuals)
             self._errors[names] = known = (
                 fit.predicted, min(map(rms, residuals)), min(map(rms, own)))
         return known
@@ -269,7 +269,7 @@ class FittedSets:
     def _largest_error(self, covariance: Covariance, level: float = ADEQUATE) -> float:
         """Return the RMS that a discrepancy stays below at a probability; see `own_error`."""
         return covariance.largest_error(
-            np.random.default_rng(self._seed), self.settings.draws, level, kept=False)
+            np.random.default_rng(self._seed), self.settings.draws, level, courses=False)
 
     def valid(self) -> list[frozenset[str]]:
         """

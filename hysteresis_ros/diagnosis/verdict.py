@@ -90,7 +90,9 @@ class Diagnosis(Result):
         On a bench the error below which none matters; None on an arm.
     kept_strain : dict or None
         What martensite that keeps strain would explain of the error that is left, which no bench
-        of constant loads shows and `structural_error` counts; see `diagnosis.kept_strain`.
+        of constant loads shows and `structural_error` counts; see `diagnosis.not_on_bench`.
+    kinetics : dict or None
+        The same of kinetics that leave minor loops open, of which a bench goes through few.
     """
 
     verdict: str
@@ -120,6 +122,7 @@ class Diagnosis(Result):
     pooled_after: float | None = None
     small_error: float | None = None
     kept_strain: dict[str, Any] | None = None
+    kinetics: dict[str, Any] | None = None
 
     @property
     def error_name(self) -> str:

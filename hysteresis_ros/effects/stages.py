@@ -82,6 +82,8 @@ class MaterialEffect(Effect):
     follows_strain: float = 0.0
     # Share, 0 to 1, of its strain that martensite keeps from the load under which it formed.
     keeps_strain: float = 0.0
+    # Share, 0 to 1, of the transformation whose minor loops are scaled from the major one.
+    kinetics: float = 0.0
     # Excess length [m] of each parallel muscle.
     offsets: tuple[float, ...] = (0.0,)
     # Parts of the wire that are not equally warm, and the excess of each over that of the wire on

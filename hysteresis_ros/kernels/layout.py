@@ -8,7 +8,7 @@ alike for every kind of operator; what follows is said in the kind's own file.
 """
 
 # Kinds of operators that are compiled.
-PREISACH, PLAY, LINEAR = 0, 1, 2
+PREISACH, PLAY, LINEAR, KINETIC = 0, 1, 2, 3
 
 # In every table: the kind, the ends of the input range, the sign of the output's slope, the lowest
 # and the highest output, and the difference of outputs that counts as rounding.

@@ -4,9 +4,9 @@
 
 import numpy as np
 
-from . import linear, play, preisach
+from . import kinetics, linear, play, preisach
 from .jit import jit
-from .layout import INPUT, KIND, OUTPUT, PLAY, PREISACH
+from .layout import INPUT, KIND, KINETIC, OUTPUT, PLAY, PREISACH
 from .lean import lean
 
 
@@ -17,6 +17,8 @@ def reset(table: np.ndarray, memory: np.ndarray) -> None:
         preisach.reset(table, memory)
     elif table[KIND] == PLAY:
         play.reset(table, memory)
+    elif table[KIND] == KINETIC:
+        kinetics.reset(table, memory)
     else:
         linear.reset(table, memory)
 
@@ -28,6 +30,8 @@ def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
         return preisach.step(table, memory, u)
     if table[KIND] == PLAY:
         return play.step(table, memory, u)
+    if table[KIND] == KINETIC:
+        return kinetics.step(table, memory, u)
     return linear.step(table, memory, u)
 
 
@@ -38,6 +42,8 @@ def peek(table: np.ndarray, memory: np.ndarray, u: float) -> float:
         return preisach.peek(table, memory, u)
     if table[KIND] == PLAY:
         return play.peek(table, memory, u)
+    if table[KIND] == KINETIC:
+        return kinetics.peek(table, memory, u)
     return linear.peek(table, memory, u)
 
 
@@ -48,6 +54,8 @@ def solve(table: np.ndarray, memory: np.ndarray, y: float) -> tuple[float, float
         return preisach.solve(table, memory, y)
     if table[KIND] == PLAY:
         return play.solve(table, memory, y)
+    if table[KIND] == KINETIC:
+        return kinetics.solve(table, memory, y)
     return linear.solve(table, memory, y)
 
 

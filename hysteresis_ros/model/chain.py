@@ -223,6 +223,11 @@ class Chain:
         return min(sum((effect.keeps_strain for effect in self.material), 0.0), 1.0)
 
     @property
+    def kinetics(self) -> float:
+        """Share, 0 to 1, of the transformation whose minor loops are scaled from the major one."""
+        return min(sum((effect.kinetics for effect in self.material), 0.0), 1.0)
+
+    @property
     def plays(self) -> bool:
         """Whether the loop's width depends on the load."""
         return bool(self._playing)

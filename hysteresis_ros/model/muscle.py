@@ -23,6 +23,7 @@ from hysteresis_ros.effects.stages import Statics
 from hysteresis_ros.errors import ModelFileError, ParameterError
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
+from hysteresis_ros.model.kinetic_stage import with_kinetics
 from hysteresis_ros.model.linear import LinearModel
 from hysteresis_ros.model.places import stage_of_places
 from hysteresis_ros.model.replicates import Replicate
@@ -225,7 +226,7 @@ class MuscleModel:
         ModelFileError
             If the model has no length stage.
         """
-        geometry, stage = self.require_geometry(), self._stage_of_places(chain)
+        geometry, stage = self.require_geometry(), self._stage_of(chain)
         loaded = self.first_stage(chain).loaded
         if self.sign > 0:
             raise ParameterError('the model is of a muscle that extends when driven; the bicep '
@@ -275,7 +276,8 @@ class MuscleModel:
         Parameters
         ----------
         chain : Chain, optional
-            Effects of the model, some of which make another operator of it; see `places`.
+            Effects of the model, some of which make another operator of it; see `places` and
+            `kinetic_stage`.
 
         Raises
         ------
@@ -285,12 +287,12 @@ class MuscleModel:
             If it has one of which they cannot.
         """
         operator = copy.deepcopy(
-            self._length_stage() if chain is None else self._stage_of_places(chain))
+            self._length_stage() if chain is None else self._stage_of(chain))
         operator.reset()
         return operator
 
-    def _stage_of_places(self, chain: Chain) -> HysteresisOperator:
-        return stage_of_places(self, chain, self._length_stage())
+    def _stage_of(self, chain: Chain) -> HysteresisOperator:
+        return with_kinetics(self, chain, stage_of_places(self, chain, self._length_stage()))
 
     def require_length_range(self) -> tuple[float, float]:
         """Return what H2 can give; ModelFileError if the model has none."""

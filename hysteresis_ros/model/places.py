@@ -89,7 +89,7 @@ def stage_of_places(model: MuscleModel, chain: Chain, stage: HysteresisOperator
     parts, excess = (tuple(column.tolist()) for column in places)
     return _mean(_Wire(
         stage, model.force_stage, model.surroundings.full_drive_squared,
-        chain.load_per_drive_squared(), _usual_load(model, chain), parts, excess, chain))
+        chain.load_per_drive_squared(), load_along(model, chain, 0.5), parts, excess, chain))
 
 
 @functools.lru_cache(maxsize=MOST_WIRES)
@@ -124,13 +124,18 @@ def _first_stage(wire: _Wire) -> tuple[np.ndarray, np.ndarray]:
     return np.append(drives, far), np.append(levels, levels[-1] + slope * (far - full))
 
 
-def _usual_load(model: MuscleModel, chain: Chain) -> float:
-    """Return the load that the transformation feels in the middle of the arm's way."""
+def load_along(model: MuscleModel, chain: Chain, share: float) -> float:
+    """
+    Return the load that the transformation feels at a share of the arm's way, 1 where it is cold.
+
+    Without an arm that is the mean load of the bench, as everywhere.
+    """
     if not model.first_stage(chain).loaded:
         return 0.0
     load = model.mean_load
     if model.geometry is not None:
-        load = _load_at(model.geometry, 0.5 * sum(model.require_length_range()))
+        short, long = model.require_length_range()
+        load = _load_at(model.geometry, short + share * (long - short))
     return float(chain.load_inside(np.float64(load)))
 
 

@@ -9,6 +9,7 @@ from .bouc_wen import BoucWen
 from .cascade import Cascade
 from .dead_zones import DeadZones
 from .everett import cell_areas, cells
+from .kinetic import Kinetic
 from .linear import Linear
 from .play import PrandtlIshlinskii
 from .preisach import Preisach
@@ -20,6 +21,7 @@ __all__ = [
     'DeadZones',
     'HysteresisOperator',
     'Inversion',
+    'Kinetic',
     'Linear',
     'PrandtlIshlinskii',
     'Preisach',

@@ -43,8 +43,8 @@ def after_diagnosis(found: Diagnosis, model: str, data: Sequence[str], origin: O
         another one.
     """
     missing = [] if any(found.alternatives) else found.missing
-    if found.verdict == 'adequate' and found.kept_strain:
-        missing = [found.kept_strain['effect']]
+    if found.verdict == 'adequate':
+        missing = [one['effect'] for one in (found.kept_strain, found.kinetics) if one]
     if missing:
         return shlex.join([
             'hysteresis', 'extend', '--model', model, '--add', ','.join(missing), '--data',

@@ -31,7 +31,8 @@ def verdict_in_words(found: Diagnosis) -> str:
     str
         One paragraph.
     """
-    return ' '.join(filter(None, (_verdict(found), kept_in_words(found))))
+    return ' '.join(filter(None, (
+        _verdict(found), kept_in_words(found), kinetics_in_words(found))))
 
 
 def kept_in_words(found: Diagnosis) -> str:
@@ -45,6 +46,19 @@ def kept_in_words(found: Diagnosis) -> str:
             'no bench of constant loads shows: martensite that keeps '
             f'{100.0 * kept["kept"]:.0f} % of its strain would leave {after} {unit}; `extend --add '
             f'{kept["effect"]}` adds it.')
+
+
+def kinetics_in_words(found: Diagnosis) -> str:
+    """Say what kinetics that leave minor loops open would explain, '' where that is not much."""
+    kinetics = found.kinetics
+    if kinetics is None:
+        return ''
+    unit, scale = shown(found.quantity)
+    before, after = (f'{scale * kinetics[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
+    return (f'Of the {before} {unit} that are left, the wire itself may be to blame, in a way that '
+            'a bench of few small loops does not show: minor loops that do not close, because '
+            f'{100.0 * kinetics["share"]:.0f} % of what transforms is in proportion to what has '
+            f'still to, would leave {after} {unit}; `extend --add {kinetics["effect"]}` adds it.')
 
 
 def _verdict(found: Diagnosis) -> str:

@@ -1,0 +1,56 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Minor loops that do not close, because what transforms goes with what has still to transform."""
+
+from hysteresis_ros.effects.base import Parameter, Surroundings
+from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
+from hysteresis_ros.effects.stages import MaterialEffect
+
+
+class Kinetics(MaterialEffect):
+    """
+    Branches inside the major loop are scaled from its own, by what has still to transform.
+
+    The branches of a Preisach operator meet again where they have parted. Those of the usual
+    kinetics of martensite do not: a minor loop begins a little further on each time, until it fits
+    in. A bench of damped oscillations goes through each minor loop once, and the weights of H2 can
+    follow it whatever its kind; on an arm that turns to and fro in the middle of its way they are
+    off by degrees. The major loop stays that of H2, and so does the share of the transformation
+    that does not follow the kinetics.
+
+    It is a property of the wire that few benches show, so it is part of the base model's own error,
+    and not what an arm lacks that runs as it always did. Who wants to know it names it, as in
+    ``diagnose(model, data, effects=[...])``.
+    """
+
+    id = 'kinetics'
+    sentence = ('What transforms is in proportion to what has still to transform, so that minor '
+                'loops do not close.')
+    equation = ('y = (1 - share) H2[u] + share Y, dY = (Y1 - Y) dR / (Y1 - R) while u rises and '
+                'dY = Y dD / D while it falls, with the branches R(u) and D(u) of the major loop '
+                'of H2 and its upper end Y1')
+    source = ('Tanaka, Res Mechanica 18 (1986) 251; Liang and Rogers, J. Intell. Mater. Syst. '
+              'Struct. 1 (1990) 207')
+    shows_in = 'small loops in the middle of the way, which shift from one to the next'
+    experiment = ('go to and fro between two drives in the middle of the loop five times: each '
+                  'loop begins a little further on')
+    confused_with = ('fatigue', 'creep')
+    parameters = (
+        Parameter('share', '1', 'share of the transformation that follows the kinetics', 0.1, 1.0,
+                  0.0, (0.4, 0.9), limits=(0.0, 1.0)),)
+
+    @property
+    def kinetics(self) -> float:    # type: ignore[override]
+        """Return the share."""
+        return self.share
+
+    @classmethod
+    def available(cls, surroundings: Surroundings) -> bool:
+        """Whether the drive heats a wire that then contracts, whose H2 is a Preisach operator."""
+        heated = surroundings.drive in (*ELECTRIC_DRIVES, 'power')
+        return heated and surroundings.sign < 0 and surroundings.operator == 'preisach'
+
+    @classmethod
+    def doubtful(cls, surroundings: Surroundings) -> bool:
+        """Whether it is tried only where it is named: always."""
+        return True

@@ -1,0 +1,147 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A Preisach operator of which a share follows the kinetics of a transformation, on packed arrays.
+
+What transforms is in proportion to what has still to transform. While the input rises from u0 to u,
+``1 - y = (1 - y0) (1 - R(u)) / (1 - R(u0))`` with the rising branch R of the major loop; while it
+falls, ``y = y0 D(u) / D(u0)`` with the falling branch D. A branch that begins inside the major loop
+never meets the one it came from, and loops shift until they fit in between (Tanaka, Res Mechanica
+18 (1986) 251; Liang and Rogers, J. Intell. Mater. Syst. Struct. 1 (1990) 207).
+
+Table, after what every table begins with: the share, what the major loop gives beyond the output
+with all relays down, nodes per unit of the input, number of nodes; R and D at the nodes, evenly
+spaced from the lower end of the range, from 0 to 1; the table of the Preisach operator. Memory: y;
+the memory of the Preisach operator.
+"""
+
+import math
+
+import numpy as np
+
+from . import preisach
+from .layout import (
+    DIRECTION, HIGH, INPUT, LOW, LOWER, MEMORY, OUTPUT, SATURATED, SIGN, TABLE, TOLERANCE, UPPER)
+from .lean import lean
+
+SHARE, TOP, SCALE, COUNT = range(TABLE, TABLE + 4)
+BRANCHES = TABLE + 4
+TRANSFORMED = MEMORY
+INNER = MEMORY + 1
+
+# Shares of what transforms from which on none counts as left.
+LEAST = 1e-9
+# Outputs that the inverse evaluates at most: by halves alone an input would be exact to 2^-60.
+MOST = 60
+
+
+@lean
+def _inner(table: np.ndarray) -> int:
+    """Return the place of the Preisach operator's table."""
+    return BRANCHES + 2 * int(table[COUNT])
+
+
+@lean
+def _branch(table: np.ndarray, first: int, u: float) -> float:
+    """Return a branch of the major loop, whose values begin at a place, at an input."""
+    last = int(table[COUNT]) - 1
+    place = min(max((u - table[LOWER]) * table[SCALE], 0.0), float(last))
+    node = min(int(place), last - 1)
+    part = place - node
+    return (1.0 - part) * table[first + node] + part * table[first + node + 1]
+
+
+@lean
+def _transformed(table: np.ndarray, memory: np.ndarray, u: float) -> float:
+    """Return what has transformed, 0 to 1, once the input has come to one inside the range."""
+    rising, falling = BRANCHES, BRANCHES + int(table[COUNT])
+    before, y = memory[INPUT], memory[TRANSFORMED]
+    low, high = _branch(table, rising, u), _branch(table, falling, u)
+    if u > before:
+        left = 1.0 - _branch(table, rising, before)
+        if left > LEAST:
+            y = 1.0 - (1.0 - y) * (1.0 - low) / left
+    elif u < before:
+        there = _branch(table, falling, before)
+        if there > LEAST:
+            y *= high / there
+    return min(max(y, low), high)
+
+
+@lean
+def output(table: np.ndarray, given: float, y: float) -> float:
+    """Return the output where the Preisach operator gives one, and y has transformed."""
+    base = table[_inner(table) + preisach.BASE]
+    scaled = base + table[SIGN] * table[TOP] * y
+    return given + table[SHARE] * (scaled - given)
+
+
+@lean
+def reset(table: np.ndarray, memory: np.ndarray) -> None:
+    """Forget the history: nothing has transformed, input at the lower end."""
+    preisach.reset(table[_inner(table):], memory[INNER:])
+    memory[INPUT] = table[LOWER]
+    memory[TRANSFORMED] = memory[SATURATED] = memory[DIRECTION] = 0.0
+    memory[OUTPUT] = output(table, memory[INNER + OUTPUT], 0.0)
+
+
+@lean
+def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
+    """Commit an input and return the output; see `HysteresisOperator.step`."""
+    memory[SATURATED] = 0.0 if table[LOWER] <= u <= table[UPPER] else 1.0
+    if not math.isnan(u):
+        u = min(max(u, table[LOWER]), table[UPPER])
+        memory[TRANSFORMED] = _transformed(table, memory, u)
+        if u != memory[INPUT]:
+            memory[DIRECTION] = 1.0 if u > memory[INPUT] else -1.0
+        memory[INPUT] = u
+        given = preisach.step(table[_inner(table):], memory[INNER:], u)
+        memory[OUTPUT] = output(table, given, memory[TRANSFORMED])
+    return memory[OUTPUT]
+
+
+@lean
+def peek(table: np.ndarray, memory: np.ndarray, u: float) -> float:
+    """Return the output that `step` would give, and commit nothing."""
+    if math.isnan(u):
+        return memory[OUTPUT]
+    u = min(max(u, table[LOWER]), table[UPPER])
+    given = preisach.peek(table[_inner(table):], memory[INNER:], u)
+    return output(table, given, _transformed(table, memory, u))
+
+
+@lean
+def solve(table: np.ndarray, memory: np.ndarray, y: float) -> tuple[float, float, bool]:
+    """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
+    low, high, tolerance = table[LOW], table[HIGH], table[TOLERANCE]
+    saturated = not low - tolerance <= y <= high + tolerance
+    y = min(max(y, low), high)
+    near, here = memory[INPUT], memory[OUTPUT] - y
+    if abs(here) <= tolerance:
+        return near, memory[OUTPUT], saturated
+    far = table[UPPER] if here * table[SIGN] < 0.0 else table[LOWER]
+    there = peek(table, memory, far) - y
+    if here * there > 0.0:
+        return far, there + y, saturated
+    # False position that halves the error of the end which stays (the Illinois algorithm).
+    stays = 0
+    for evaluated in range(MOST):
+        if abs(there) <= tolerance:
+            near, here = far, there
+            break
+        u = near + (far - near) * here / (here - there)
+        if evaluated % 4 == 3 or not min(near, far) < u < max(near, far):
+            u = 0.5 * (near + far)
+        if u == near or u == far:
+            break
+        error = peek(table, memory, u) - y
+        if error * here > 0.0:
+            near, here = u, error
+            there *= 0.5 if stays == 1 else 1.0
+            stays = 1
+        else:
+            far, there = u, error
+            here *= 0.5 if stays == -1 else 1.0
+            stays = -1
+    u = near if abs(peek(table, memory, near) - y) <= abs(peek(table, memory, far) - y) else far
+    return u, peek(table, memory, u), saturated

@@ -1,0 +1,61 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The second stage of a wire whose minor loops are scaled from the major one (`Kinetics`)."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.model.places import load_along
+from hysteresis_ros.operators import HysteresisOperator, Kinetic
+from hysteresis_ros.operators.preisach import Preisach
+
+if TYPE_CHECKING:
+    from hysteresis_ros.model.chain import Chain
+    from hysteresis_ros.model.muscle import MuscleModel
+
+# Operators that are remembered: where a search moves other parameters they come again.
+MOST_STAGES = 64
+
+
+def with_kinetics(model: MuscleModel, chain: Chain, stage: HysteresisOperator
+                  ) -> HysteresisOperator:
+    """
+    Return H2 with the kinetics that the effects of a model give it, with any memory.
+
+    All has transformed where the wire is cold, under the load of the cold arm or, without an arm,
+    under the mean load of the bench: the major loop begins there.
+
+    Parameters
+    ----------
+    model : MuscleModel
+        First stage and arm.
+    chain : Chain
+        Its effects.
+    stage : HysteresisOperator
+        H2 without; it is returned where the effects leave it so.
+
+    Raises
+    ------
+    ParameterError
+        If no kinetics of this operator are known.
+    """
+    share = chain.kinetics
+    if share == 0.0:
+        return stage
+    if not isinstance(stage, Preisach) or model.sign > 0:
+        raise ParameterError('a wire whose minor loops follow its kinetics (effect kinetics) needs '
+                             'a Preisach length stage of a muscle that contracts when driven, not '
+                             f'a {stage.kind} one; identify it with --operator two-stage')
+    first = model.first_stage(chain)
+    first.reset()
+    cold = load_along(model, chain, 1.0) - first.step(chain.to_drive_squared(model.cold_drive))
+    top = float(cold) if stage.lower < cold < stage.upper else stage.upper
+    return _kinetic(stage, share, top)
+
+
+@functools.lru_cache(maxsize=MOST_STAGES)
+def _kinetic(stage: Preisach, share: float, top: float) -> Kinetic:
+    return Kinetic(stage, share, top)
