@@ -388,7 +388,8 @@ def test_parameters_survive_a_file_to_the_last_bit():
 
 
 @pytest.mark.parametrize('parameters, message', [
-    ({'kind': 'pressach'}, "unknown kind 'pressach': use one of bouc-wen, linear, play, pre"),
+    ({'kind': 'pressach'},
+     "unknown kind 'pressach': use one of bouc-wen, kinetic, linear, play, pre"),
     ({}, 'unknown kind None'),
     ('preisach', 'unknown kind None'),
     ({'kind': ['preisach']}, 'unknown kind'),

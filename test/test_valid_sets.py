@@ -29,7 +29,7 @@ def payload(model):
 def test_a_set_suffices_as_far_as_model_and_equation_may_be_off(payload, monkeypatch):
     """Along the way that the arm takes with the set: 95 % of draws of that error are smaller."""
     names = frozenset(['payload_error'])
-    matrix = payload.fitter.discrepancy(payload.sets.fits[names]).matrix()
+    matrix = payload.fitter.discrepancy(payload.sets.fits[names]).matrix(courses=False)
     rng = np.random.default_rng(8)
     draws = rng.multivariate_normal(np.zeros(len(matrix)), matrix, 4000, method='eigh')
     sizes = np.sqrt(np.mean(draws ** 2, axis=1)) * np.exp(

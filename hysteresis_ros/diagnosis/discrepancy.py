@@ -33,7 +33,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.effects import Effect, Inputs, MaterialEffect, Parameter, Surroundings
@@ -116,6 +115,7 @@ class Discrepancy:
 
     def shares(self, residual: np.ndarray) -> np.ndarray:
         """Return the shares (2,) of the `courses`, 0 to 1, that explain most of a residual (n,)."""
+        from scipy.optimize import lsq_linear       # a third of a second that a bench does not need
         found, acting = np.zeros(self.courses.shape[1]), np.any(self.courses, axis=0)
         if np.any(acting):
             found[acting] = lsq_linear(

@@ -42,9 +42,10 @@ def kept_in_words(found: Diagnosis) -> str:
         return ''
     unit, scale = shown(found.quantity)
     before, after = (f'{scale * kept[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
-    return (f'The residual of {before} {unit} may be that of the wire itself, in a way that no bench '
-            f'of constant loads shows: with martensite that keeps {100.0 * kept["kept"]:.0f} % of '
-            f'its strain it is {after} {unit}; `extend --add {kept["effect"]}` adds it.')
+    return (f'The residual of {before} {unit} may be that of the wire itself, in a way that no '
+            'bench of constant loads shows: with martensite that keeps '
+            f'{100.0 * kept["kept"]:.0f} % of its strain it is {after} {unit}; `extend --add '
+            f'{kept["effect"]}` adds it.')
 
 
 def kinetics_in_words(found: Diagnosis) -> str:
@@ -54,8 +55,8 @@ def kinetics_in_words(found: Diagnosis) -> str:
         return ''
     unit, scale = shown(found.quantity)
     before, after = (f'{scale * kinetics[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
-    return (f'The residual of {before} {unit} may be that of the wire itself, in a way that a bench '
-            'with few minor loops does not show: with minor loops that do not close, because '
+    return (f'The residual of {before} {unit} may be that of the wire itself, in a way that a '
+            'bench with few minor loops does not show: with minor loops that do not close, because '
             f'{100.0 * kinetics["share"]:.0f} % of what transforms is in proportion to what has '
             f'still to, it is {after} {unit}; `extend --add {kinetics["effect"]}` adds it.')
 
