@@ -104,6 +104,21 @@ def test_the_inverse_gives_what_is_asked_and_the_nearest_input(share, top, sign,
     assert operator.invert(np.nan).saturated
 
 
+@settings(max_examples=20, deadline=None)
+@given(top=st.floats(2.0, 4.0), seed=st.integers(0, 1000))
+def test_minor_loops_stay_inside_of_the_major_one(top, seed):
+    """Also where its branches overlap, and a scaled one would leave it."""
+    rng = np.random.default_rng(seed)
+    operator = Kinetic(Preisach(np.linspace(-3.0, 4.0, 9), rng.random(36), 0.3), 1.0, top)
+    inputs = rng.uniform(-3.0, top, 60)
+    rising, falling = (
+        np.array([operator.preisach.simulate(np.array([-3.0, *way, u]))[-1] for u in inputs])
+        for way in ([], [top]))
+    found = operator.simulate(inputs)
+    close = 2e-3 * np.ptp(operator.output_range)
+    assert np.all(found >= rising - close) and np.all(found <= falling + close)
+
+
 def test_an_input_that_is_none_is_flagged_and_changes_nothing():
     operator = tanaka(0.6)
     output = operator.step(2.5)
@@ -218,8 +233,9 @@ def test_they_hide_nothing_that_is_missing(model):
     assert found.kinetics['share'] == pytest.approx(0.8, abs=0.15)
 
 
-def test_nothing_is_said_of_loops_that_close(model):
-    found = diagnose(model, [recorded(model, 0.0)], TRIED)
+@pytest.mark.parametrize('share', [0.0, 0.07])
+def test_nothing_is_said_of_loops_that_close_or_nearly_do(model, share):
+    found = diagnose(model, [recorded(model, share)], TRIED)
     assert found.verdict == 'adequate' and found.kinetics is None
 
 

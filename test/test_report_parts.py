@@ -100,6 +100,7 @@ def test_a_tied_effect_is_no_rival():
 
 
 KEPT = {'effect': 'formation_memory', 'kept': 0.9, 'rmse_before': 0.02, 'rmse_after': 0.005}
+KINETICS = {'effect': 'kinetics', 'share': 0.8, 'rmse_before': 0.02, 'rmse_after': 0.005}
 
 
 @pytest.mark.parametrize('changes, command, added', [
@@ -107,6 +108,8 @@ KEPT = {'effect': 'formation_memory', 'kept': 0.9, 'rmse_before': 0.02, 'rmse_af
     ({'verdict': 'adequate', 'missing': [], 'alternatives': []}, 'compare', None),
     ({'verdict': 'adequate', 'missing': [], 'alternatives': [], 'kept_strain': KEPT}, 'extend',
      'formation_memory'),
+    ({'verdict': 'adequate', 'missing': [], 'alternatives': [], 'kept_strain': KEPT,
+      'kinetics': KINETICS}, 'extend', 'formation_memory,kinetics'),
     ({**ALONE, 'kept_strain': KEPT}, 'extend', 'payload_error'),
     ({'verdict': 'unknown', 'missing': []}, 'diagnose', None)])
 def test_the_next_command_is_one_that_the_command_line_takes(changes, command, added):
