@@ -143,43 +143,6 @@ def test_what_every_loaded_muscle_has_is_tried_in_all_its_forms(selection, monke
             and effects[1].id == 'stress_dependent_strain'} >= {2.0, 4.0}
 
 
-def test_sets_begin_again_where_smaller_and_larger_ones_ended_better(selection, monkeypatch):
-    """A better minimum of one set goes to a larger one, and from there to another part of it."""
-    search, kinds = selection._search, catalogue()
-    surroundings, problem = selection.problem.model.surroundings, search.fitter.problem
-
-    def fitted(away, effects):
-        response = Response(problem, [], list(effects))
-        fit = response.fit(response.parameters.vector())
-        return dataclasses.replace(fit, predicted=problem.measured + away)
-    growth, far = (kinds['stress_dependent_strain'](surroundings, r=0.3, F0=F0)
-                   for F0 in (2.0, 5.0))
-    softer, widens = (kinds['phase_modulus'](surroundings, m=0.1),
-                      kinds['transformation_slopes'](surroundings, g=0.2))
-    wide = kinds['transformation_slopes'](surroundings, g=0.6)
-    begun = []
-
-    def better(task, fitter, starts):
-        begun.append(starts)
-        return [fitted(0.995e-4 if effects[-1].values.get('g', 0.0) > 0.5 else below, effects)
-                for effects, below in starts]
-    monkeypatch.setattr(search, '_in_parallel', better)
-    found = {fit.names: fit for fit in search._begun_where_others_ended([
-        fitted(1e-4, [growth, wide]), fitted(1.5e-4, [softer, widens]),
-        fitted(1.5e-4, [far, softer, widens]), fitted(2e-4, [softer])])}
-    first, second = ([[{name: pytest.approx(value) for name, value in effect.values.items()}
-                       for effect in effects] for effects, _ in starts] for starts in begun[:2])
-    assert first == [[growth.values, softer.values, wide.values], [softer.values]]
-    assert begun[0][0][1] == pytest.approx(1.01 * 1.5e-4, rel=1e-6)
-    assert second == [[softer.values, wide.values], [softer.values]]
-    by_names = {frozenset(names): fit.effects for names, fit in found.items()}
-    assert by_names[frozenset(('phase_modulus', 'transformation_slopes'))][-1].g == (
-        pytest.approx(wide.g))
-    # What did not come out better stays as it was, and does not begin there a second time.
-    assert found['phase_modulus',].predicted == pytest.approx(problem.measured + 2e-4)
-    assert len(begun) == 3
-
-
 def test_sets_are_tried_in_the_simplest_forms_of_their_equations(selection, monkeypatch):
     """A form that fitted rows prefer may predict a load that is left out far worse."""
     search, kinds = selection._search, catalogue()

@@ -70,7 +70,7 @@ class BenchSearch:
             The best of each size again, in other forms of its effects' equations, and sets in the
             simplest ones.
         """
-        fits = self._begun_where_others_ended(
+        fits = self._begun_where_larger_ended(
             self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
         return fits, [*self._in_other_forms(fits), *self._in_simplest_forms(fits)]
 
@@ -139,35 +139,27 @@ class BenchSearch:
     def _fitted_error(self, fit: Fit) -> float:
         return self._coarse.error(fit.predicted)
 
-    def _begun_where_others_ended(self, fits: Sequence[Fit]) -> list[Fit]:
+    def _begun_where_larger_ended(self, fits: Sequence[Fit]) -> list[Fit]:
         """
-        Return fits, again from the values of a smaller or larger set that has less error.
+        Return fits, again from the values that a larger set has found if that had less error.
 
-        A set that fits worse than a part of it has ended in a local minimum. One that fits worse
-        than a larger one may have: what the larger adds may do nothing but lead out of it. Until
-        no set is fitted better.
+        What the larger set adds may do nothing but lead out of a local minimum.
         """
         found = {frozenset(fit.names): fit for fit in fits}
         errors = {names: self.fitter.error(fit.predicted) for names, fit in found.items()}
-        followed: dict[frozenset[str], Fit] = {}
-        while True:
-            starts = []
-            for names, fit in found.items():
-                related = [other for other in found if (names < other or other < names)
-                           and errors[other] < (1.0 - WORTH_JUDGING) * errors[names]]
-                best = found[min(related, key=lambda one: errors[one])] if related else None
-                if best is not None and followed.get(names) is not best:
-                    followed[names] = best
-                    ended = {effect.id: effect for effect in best.effects}
-                    starts.append(([ended.get(effect.id, effect) for effect in fit.effects],
-                                   (1.0 + WORTH_JUDGING) * errors[names]))
-            better = [fit for fit in self._in_parallel(_fitted_below, self.fitter, starts)
-                      if self.fitter.error(fit.predicted) < errors[frozenset(fit.names)]]
-            if not better:
-                return list(found.values())
-            for fit in better:
-                found[frozenset(fit.names)] = fit
-                errors[frozenset(fit.names)] = self.fitter.error(fit.predicted)
+        starts = []
+        for names in found:
+            larger = [other for other in found if names < other
+                      and errors[other] < (1.0 - WORTH_JUDGING) * errors[names]]
+            if larger:
+                ended = found[min(larger, key=lambda one: errors[one])]
+                starts.append(([effect for effect in ended.effects if effect.id in names],
+                               (1.0 + WORTH_JUDGING) * errors[names]))
+        for fit in self._in_parallel(_fitted_below, self.fitter, starts):
+            names = frozenset(fit.names)
+            if self.fitter.error(fit.predicted) < errors[names]:
+                found[names] = fit
+        return list(found.values())
 
     def _in_other_forms(self, fits: Sequence[Fit]) -> list[Fit]:
         """
