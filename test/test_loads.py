@@ -120,6 +120,7 @@ def test_a_clean_arm_is_not_faulty_by_a_bench_of_two_loads(two_loads):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_no_effect_of_a_clean_arm_is_named_by_a_bench_of_two_loads():
     """
     Neither beyond the bench's loads nor between two that are far apart, whatever the bench proves.

@@ -132,7 +132,7 @@ class ResistanceChange(ElectricalEffect):
     needs_phase = True
     parameters = (
         Parameter('eta', '1', 'resistance of martensite over that of austenite, less one',
-                  0.02, 0.20, 0.0, (-0.1, -0.03, 0.03, 0.1), both_signs=True),
+                  0.02, 0.20, 0.0, (-0.1, 0.1), both_signs=True),
         Parameter('xi0', '1', 'martensite share at which the resistance is that of the bench', 0.0,
                   1.0, 0.0, (0.0,), choices=(0.0, 0.5, 1.0)))
 
