@@ -107,7 +107,7 @@ def test_the_inverse_gives_what_is_asked_and_the_nearest_input(share, top, sign,
 @settings(max_examples=20, deadline=None)
 @given(top=st.floats(2.0, 4.0), seed=st.integers(0, 1000))
 def test_minor_loops_stay_inside_of_the_major_one(top, seed):
-    """Also where its branches overlap, and a scaled one would leave it."""
+    """Whatever its weights."""
     rng = np.random.default_rng(seed)
     operator = Kinetic(Preisach(np.linspace(-3.0, 4.0, 9), rng.random(36), 0.3), 1.0, top)
     inputs = rng.uniform(-3.0, top, 60)
@@ -117,6 +117,17 @@ def test_minor_loops_stay_inside_of_the_major_one(top, seed):
     found = operator.simulate(inputs)
     close = 2e-3 * np.ptp(operator.output_range)
     assert np.all(found >= rising - close) and np.all(found <= falling + close)
+
+
+def test_a_scaled_branch_ends_at_the_major_loop():
+    """A tenth goes up and down at -2 at once; what goes down at 3 would take it along, scaled."""
+    nodes = np.array([-3.0, -2.0, -1.9, 2.9, 3.0, 4.0])
+    beta, alpha = cells(5)
+    weights = np.where((beta == 1) & (alpha == 1), 20.0, 0.0)
+    weights[(beta == 3) & (alpha == 4)] = 9.0
+    operator = Kinetic(Preisach(nodes, weights), 1.0)
+    scaled, own = (along(one, -3.0, 2.95, 0.0)[-1] for one in (operator, operator.preisach))
+    assert own > 0.05 and scaled == pytest.approx(own, abs=5e-3)
 
 
 def test_an_input_that_is_none_is_flagged_and_changes_nothing():

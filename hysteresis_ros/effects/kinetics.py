@@ -3,7 +3,7 @@
 """Minor loops that do not close, because what transforms goes with what has still to transform."""
 
 from hysteresis_ros.effects.base import Parameter, Surroundings
-from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
+from hysteresis_ros.effects.material import HEATING
 from hysteresis_ros.effects.stages import MaterialEffect
 
 
@@ -46,9 +46,9 @@ class Kinetics(MaterialEffect):
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:
-        """Whether the drive heats a wire that then contracts, whose H2 is a Preisach operator."""
-        heated = surroundings.drive in (*ELECTRIC_DRIVES, 'power')
-        return heated and surroundings.sign < 0 and surroundings.operator == 'preisach'
+        """Whether heat contracts the muscle, whose H2 is a Preisach operator."""
+        return (surroundings.drive in HEATING and surroundings.sign < 0
+                and surroundings.operator == 'preisach')
 
     @classmethod
     def doubtful(cls, surroundings: Surroundings) -> bool:

@@ -7,8 +7,7 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING
 
-from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.model.places import load_along
+from hysteresis_ros.model.places import contracting, load_along
 from hysteresis_ros.operators import HysteresisOperator, Kinetic
 from hysteresis_ros.operators.preisach import Preisach
 
@@ -45,10 +44,8 @@ def with_kinetics(model: MuscleModel, chain: Chain, stage: HysteresisOperator
     share = chain.kinetics
     if share == 0.0:
         return stage
-    if not isinstance(stage, Preisach) or model.sign > 0:
-        raise ParameterError('a wire whose minor loops follow its kinetics (effect kinetics) needs '
-                             'a Preisach length stage of a muscle that contracts when driven, not '
-                             f'a {stage.kind} one; identify it with --operator two-stage')
+    stage = contracting(
+        model, stage, 'a wire whose minor loops follow its kinetics (effect kinetics)')
     first = model.first_stage(chain)
     first.reset()
     cold = load_along(model, chain, 1.0) - first.step(chain.to_drive_squared(model.cold_drive))

@@ -82,14 +82,27 @@ def stage_of_places(model: MuscleModel, chain: Chain, stage: HysteresisOperator
     places = chain.places
     if places is None:
         return stage
-    if not isinstance(stage, Preisach) or model.sign > 0:
-        raise ParameterError('a wire with cold ends (effect cold_clamps) needs a Preisach length '
-                             'stage of a muscle that contracts when driven, not a '
-                             f'{stage.kind} one; identify it with --operator two-stage')
+    stage = contracting(model, stage, 'a wire with cold ends (effect cold_clamps)')
     parts, excess = (tuple(column.tolist()) for column in places)
     return _mean(_Wire(
         stage, model.force_stage, model.surroundings.full_drive_squared,
         chain.load_per_drive_squared(), load_along(model, chain, 0.5), parts, excess, chain))
+
+
+def contracting(model: MuscleModel, stage: HysteresisOperator, wire: str) -> Preisach:
+    """
+    Return H2 if it is a Preisach operator of a muscle that contracts when driven.
+
+    Raises
+    ------
+    ParameterError
+        If not; it says what kind of `wire` needs one.
+    """
+    if not isinstance(stage, Preisach) or model.sign > 0:
+        raise ParameterError(f'{wire} needs a Preisach length stage of a muscle that contracts '
+                             f'when driven, not a {stage.kind} one; identify it with --operator '
+                             'two-stage')
+    return stage
 
 
 @functools.lru_cache(maxsize=MOST_WIRES)

@@ -33,8 +33,8 @@ class Kinetic(CompiledOperator):
     share : float
         From 0, the Preisach operator itself, to 1.
     top : float
-        Input at which all has transformed: from there the falling branch begins. Up to the upper
-        end of the range, which it is by default.
+        Input at which all has transformed, where the falling branch begins. Default: the upper end
+        of the range.
 
     Raises
     ------

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
@@ -31,34 +31,27 @@ def verdict_in_words(found: Diagnosis) -> str:
     str
         One paragraph.
     """
-    return ' '.join(filter(None, (
-        _verdict(found), kept_in_words(found), kinetics_in_words(found))))
+    kept, kinetics = found.kept_strain, found.kinetics
+    sentences = [_verdict(found)]
+    if kept is not None:
+        sentences.append(_wire_in_words(
+            found, kept, 'no bench of constant loads shows',
+            f'martensite that keeps {100.0 * kept["kept"]:.0f} % of its strain'))
+    if kinetics is not None:
+        sentences.append(_wire_in_words(
+            found, kinetics, 'a bench with few minor loops does not show',
+            f'minor loops that do not close, because {100.0 * kinetics["share"]:.0f} % of what '
+            'transforms is in proportion to what has still to,'))
+    return ' '.join(sentences)
 
 
-def kept_in_words(found: Diagnosis) -> str:
-    """Say what martensite that keeps strain would explain, '' where that is not much."""
-    kept = found.kept_strain
-    if kept is None:
-        return ''
+def _wire_in_words(found: Diagnosis, own: dict[str, Any], shown_by: str, what: str) -> str:
+    """Say what a property of the wire itself would explain of a residual."""
     unit, scale = shown(found.quantity)
-    before, after = (f'{scale * kept[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
-    return (f'The residual of {before} {unit} may be that of the wire itself, in a way that no '
-            'bench of constant loads shows: with martensite that keeps '
-            f'{100.0 * kept["kept"]:.0f} % of its strain it is {after} {unit}; `extend --add '
-            f'{kept["effect"]}` adds it.')
-
-
-def kinetics_in_words(found: Diagnosis) -> str:
-    """Say what kinetics that leave minor loops open would explain, '' where that is not much."""
-    kinetics = found.kinetics
-    if kinetics is None:
-        return ''
-    unit, scale = shown(found.quantity)
-    before, after = (f'{scale * kinetics[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
-    return (f'The residual of {before} {unit} may be that of the wire itself, in a way that a '
-            'bench with few minor loops does not show: with minor loops that do not close, because '
-            f'{100.0 * kinetics["share"]:.0f} % of what transforms is in proportion to what has '
-            f'still to, it is {after} {unit}; `extend --add {kinetics["effect"]}` adds it.')
+    before, after = (f'{scale * own[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
+    return (f'The residual of {before} {unit} may be that of the wire itself, in a way that '
+            f'{shown_by}: with {what} it is {after} {unit}; `extend --add {own["effect"]}` adds '
+            'it.')
 
 
 def _verdict(found: Diagnosis) -> str:
