@@ -12,6 +12,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.bench_kinetics import shown_kinetics
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.between_loads import best_between_loads
 from hysteresis_ros.diagnosis.determined import not_determined
@@ -24,6 +25,7 @@ from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
+from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, measure
 from hysteresis_ros.workers import one_blas_thread
@@ -54,7 +56,7 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
         The bench tables; `force` only for the metrics.
     names : sequence of str, optional
         Effects to add; by default those that the length table proves, and with them those that
-        every loaded muscle has.
+        every loaded muscle has, and kinetics, where loads held out show them.
     length_trials, force_trials : sequence of numbers, optional
         Trials that are fitted; the others verify.
     jobs : int
@@ -126,6 +128,9 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     """Return the model with the effects found and usual but for some, and those effects."""
     known = _with_universal(
         model, [effect for effect in found if effect.id not in excluded], problem, excluded)
+    if Kinetics.id not in excluded:
+        shown = shown_kinetics(BenchFitter(problem.finer()), known, Settings().practical)
+        known = shown.effects if shown else known
     if not known:
         return model, []
     return extended_model(model, [one.id for one in known], problem.measurements, known)

@@ -19,11 +19,12 @@ import numpy as np
 from scipy import sparse
 
 from hysteresis_ros.diagnosis.bench_design import (
-    Course, Design, Excitation, operator_with, weight_sizes)
+    Course, Design, Excitation, operator_with, Shown, weight_sizes)
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench import left_out
+from hysteresis_ros.identification.fixed_point import fixed_point
 from hysteresis_ros.identification.grid import FOLLOWING
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
 from hysteresis_ros.identification.nonnegative import extrapolated, part_of
@@ -31,6 +32,7 @@ from hysteresis_ros.identification.projection import ProjectedWeights
 from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.kinetic_stage import kinetic_stage, with_kinetics
 from hysteresis_ros.operators import Preisach
 from hysteresis_ros.workers import map_in_forks
 
@@ -51,8 +53,11 @@ SEARCH_STRENGTH = 3e-9
 HELD_OUT_STRENGTH = 1e-9
 # Courses that are remembered, those of the latest effects.
 MOST_COURSES = 20
-# How often weights and the martensite share that they show are fitted to each other.
-PHASE_PASSES = 2
+# How often weights and what they show are fitted to each other.
+PASSES = 2
+# The same at most for weights and kinetics, which are fitted to each other until what these give
+# changes by less than the share of the response's spread: on twelve benches four passes do.
+MOST_PASSES, SETTLED = 8, 3e-4
 # A finer grid has to lower the held-out error by this share.
 WORTH = 0.02
 # How much finer than the model's the grid of H2 may be once its effects are known.
@@ -76,7 +81,7 @@ class Solution:
 
     weights: ProjectedWeights
     predicted: np.ndarray
-    phases: list[np.ndarray] | None
+    shown: Shown | None
 
 
 class BenchProblem(Problem):
@@ -118,6 +123,7 @@ class BenchProblem(Problem):
         self._excitations: dict[tuple, Excitation] = {}
         self._phases_of: tuple | None = None
         self._known_phases: list[np.ndarray] = []
+        self._known_beyond: np.ndarray | None = None
 
     def finer(self) -> BenchProblem:
         """Return the same rows with H2 on the grid on which sets of effects are judged."""
@@ -146,6 +152,7 @@ class BenchProblem(Problem):
             Those of a neighbouring problem that are not at their bound, and the bias.
         """
         self._passive = {} if passive is None else {None: passive}
+        self._known_beyond = None
 
     def holding_out(self) -> BenchProblem:
         """Return the same rows and grid, with weights regularised as for rows held out."""
@@ -187,41 +194,41 @@ class BenchProblem(Problem):
         return np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
 
     def _design(self, effects: Sequence[Effect], levels: int | None = None,
-                train: np.ndarray | None = None, phases: list[np.ndarray] | None = None,
+                train: np.ndarray | None = None, shown: Shown | None = None,
                 columns: np.ndarray | None = None) -> Design:
-        if phases is None and needs_phase(effects):
-            phases = self._phases(effects, train)
-        course = self._course(effects, phases)
+        course = self._course(effects, shown or self._shown(effects, train))
         levels = levels or self.levels
         scale, known = (column[self._judged] for column in (course.scales, course.known))
         return Design(course.excitation.shares(levels, scale, columns), known,
                       course.excitation.nodes(levels), course.excitation.smoothness(levels))
 
-    def _course(self, effects: Sequence[Effect], phases: list[np.ndarray] | None) -> Course:
+    def _course(self, effects: Sequence[Effect], shown: Shown | None) -> Course:
         key = tuple((effect.id, *effect.values.values()) for effect in effects)
-        if phases is not None or key not in self._courses:
-            course = self._new_course(Chain(effects, self._surroundings), phases)
-            if phases is not None:
+        if shown is not None or key not in self._courses:
+            course = self._new_course(Chain(effects, self._surroundings), shown)
+            if shown is not None:
                 return course
             # Folds that are held out in turn begin at the same effects.
             _remember(self._courses, key, course)
         return self._courses[key]
 
-    def _new_course(self, chain: Chain, phases: list[np.ndarray] | None) -> Course:
+    def _new_course(self, chain: Chain, shown: Shown | None) -> Course:
         load, cold = self._load, chain.to_drive_squared(self.model.cold_drive)
         driven: list[Any] = []
         drifts: list[tuple[np.ndarray, np.ndarray]] = []
         for number, trial in enumerate(self._trials):
             inputs = trial.inputs
-            if phases is not None:
-                inputs = inputs._replace(phase=phases[number])
+            if shown is not None and shown.phases is not None:
+                inputs = inputs._replace(phase=shown.phases[number])
             squared = chain.drive_squared(trial.drive, inputs)
             driven += [[cold], squared]
             if chain.drifts:
                 drifts.append(chain.drift(trial.drive, squared, inputs))
         offset, factor = np.concatenate(drifts, axis=1) if drifts else (0.0, 1.0)
-        return Course(self._excitation(chain, np.concatenate(driven)),
-                      chain.scale(load) * factor + 0.0 * load, chain.stretch(load) + offset)
+        scales, known = chain.scale(load) * factor + 0.0 * load, chain.stretch(load) + offset
+        if shown is not None and shown.beyond is not None:
+            known = known + chain.kinetics * scales * shown.beyond
+        return Course(self._excitation(chain, np.concatenate(driven)), scales, known)
 
     def _excitation(self, chain: Chain, squared: np.ndarray) -> Excitation:
         """Return what H2 is given for the drive squared of all trials, shape (rows + trials,)."""
@@ -251,6 +258,47 @@ class BenchProblem(Problem):
             begin = end
         return x
 
+    def _shown(self, effects: Sequence[Effect], train: np.ndarray | None) -> Shown | None:
+        """Return what the best weights show of what they depend on; None where it is nothing."""
+        phases = self._phases(effects, train) if needs_phase(effects) else None
+        if Chain(effects, self._surroundings).kinetics > 0.0:
+            return Shown(phases, self._beyond(effects, train, phases))
+        return None if phases is None else Shown(phases, None)
+
+    def _beyond(self, effects: Sequence[Effect], train: np.ndarray | None,
+                phases: list[np.ndarray] | None) -> np.ndarray:
+        """Return what kinetics of all of the wire add to H2 with its best weights, (rows,)."""
+        def made(beyond: np.ndarray) -> np.ndarray:
+            shown = Shown(phases, beyond)
+            design = self._design(effects, train=train, shown=shown)
+            z = self._projected(design, train).z
+            return self._made_by_kinetics(effects, _operator(design, z), shown)
+
+        # What neighbouring parameters gave, or neighbouring rows, is near.
+        begin = np.zeros(len(self._load)) if self._known_beyond is None else self._known_beyond
+        self._known_beyond = fixed_point(
+            made, begin, SETTLED * float(np.std(self.measured)), MOST_PASSES)
+        return self._known_beyond
+
+    def _made_by_kinetics(self, effects: Sequence[Effect], stage: Preisach, shown: Shown
+                          ) -> np.ndarray:
+        """Return what kinetics of all of the wire add to the output of an H2, shape (rows,)."""
+        whole = kinetic_stage(self.model, Chain(effects, self._surroundings), stage, 1.0)
+        kinetic, plain = (np.concatenate(self._outputs(effects, one, shown))
+                          for one in (whole, stage))
+        return kinetic - plain
+
+    def _outputs(self, effects: Sequence[Effect], stage: HysteresisOperator, shown: Shown | None
+                 ) -> list[np.ndarray]:
+        """Return what an H2 gives in every row of each trial."""
+        found = []
+        inputs = self._course(effects, shown).excitation.inputs
+        for part in np.split(inputs, self._ends[:-1]):
+            stage.reset()
+            stage.step(part[0])
+            found.append(stage.simulate(part[1:]))
+        return found
+
     def _phases(self, effects: Sequence[Effect], train: np.ndarray | None) -> list[np.ndarray]:
         """
         Return the martensite share in every row of each trial.
@@ -262,24 +310,25 @@ class BenchProblem(Problem):
         key = (None if train is None else train.tobytes(),
                *((effect.id, *effect.values.items()) for effect in effects))
         if key != self._phases_of:
-            design = self._design(effects, train=train)
-            z = self._projected(design, train).z
-            self._known_phases = self._phases_with(
-                effects, operator_with(design.nodes, z[:-1] / weight_sizes(design.nodes), 0.0))
+            shown = self._shown(effects, train)
+            design = self._design(effects, train=train, shown=shown)
+            stage = _operator(design, self._projected(design, train).z)
+            self._known_phases = self._phases_with(effects, stage, shown)
             self._phases_of = key
         return self._known_phases
 
-    def _phases_with(self, effects: Sequence[Effect], stage: HysteresisOperator,
-                     phases: list[np.ndarray] | None = None) -> list[np.ndarray]:
-        """Return the martensite share that H2 shows in every row of each trial."""
+    def _phases_with(self, effects: Sequence[Effect], stage: Preisach, shown: Shown | None
+                     ) -> list[np.ndarray]:
+        """Return the martensite share that an H2 shows in every row of each trial."""
         model = dataclasses.replace(self.model, length_stage=stage)
-        found = []
-        inputs = self._course(effects, phases).excitation.inputs
-        for part in np.split(inputs, self._ends[:-1]):
-            stage.reset()
-            stage.step(part[0])
-            found.append(model.martensite(stage.simulate(part[1:])))
-        return found
+        whole = with_kinetics(self.model, Chain(effects, self._surroundings), stage)
+        return [model.martensite(output) for output in self._outputs(effects, whole, shown)]
+
+    def _shown_with(self, effects: Sequence[Effect], stage: Preisach, shown: Shown) -> Shown:
+        """Return what an H2 shows of what was shown by another one."""
+        phases = None if shown.phases is None else self._phases_with(effects, stage, shown)
+        return Shown(phases, None if shown.beyond is None
+                     else self._made_by_kinetics(effects, stage, shown))
 
     def fit_stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray | None = None
                   ) -> tuple[WeightFit, Design]:
@@ -303,19 +352,17 @@ class BenchProblem(Problem):
         groups = self.trial[rows]
         if len(np.unique(groups)) == 1:
             groups = self.block[rows]
-        phases, passes = None, 0
-        if needs_phase(effects):
-            phases, passes = self._phases(effects, train), PHASE_PASSES
-        for remaining in range(passes, -1, -1):
-            design = self._design(effects, levels, phases=phases)
+        shown = self._shown(effects, train)
+        for remaining in range(PASSES if shown else 0, -1, -1):
+            design = self._design(effects, levels, shown=shown)
             fit = fit_weights(
                 design.rows[rows], (self.measured - design.known)[rows], groups=groups,
                 scale=weight_sizes(design.nodes), slack=SLACK,
                 penalty=smoothness(design.nodes, reversible=True))
-            if remaining:
-                # The share that these weights show is not quite that of those without the effect.
-                phases = self._phases_with(
-                    effects, operator_with(design.nodes, fit.weights, fit.bias), phases)
+            if remaining and shown:
+                # These weights, which are smoother, do not show quite the same.
+                shown = self._shown_with(
+                    effects, operator_with(design.nodes, fit.weights, fit.bias), shown)
         return fit, design
 
     def stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray) -> Preisach:
@@ -338,19 +385,17 @@ class BenchProblem(Problem):
         train : ndarray of bool, shape (n,), optional
             Rows to fit; all by default.
         """
-        phases = None
-        if needs_phase(effects):
-            phases = self._phases(effects, train)
-        design = self._design(effects, phases=phases)
+        shown = self._shown(effects, train)
+        design = self._design(effects, shown=shown)
         weights = self._projected(design, train)
-        return Solution(weights, self._response(effects, design, weights.z), phases)
+        return Solution(weights, self._response(effects, design, weights.z), shown)
 
     def near(self, solution: Solution, effects: Sequence[Effect],
              train: np.ndarray | None = None) -> np.ndarray:
         """
         Return the response for effects that differ a little from those of a solution.
 
-        Weights that are zero stay so, and so does the martensite share that effects may look at.
+        Weights that are zero stay so, and so does what they have shown.
 
         Parameters
         ----------
@@ -361,7 +406,7 @@ class BenchProblem(Problem):
             The rows that the solution was fitted to.
         """
         columns = solution.weights.columns
-        design = self._design(effects, phases=solution.phases, columns=columns)
+        design = self._design(effects, shown=solution.shown, columns=columns)
         penalty = self._strength * part_of(design.smoothness, columns)
         penalty.flat[::len(columns) + 1] += self._further(design, train) * np.diag(penalty)
         z = solution.weights.moved(*self._rows(design, train), penalty)
@@ -434,6 +479,11 @@ class BenchProblem(Problem):
             fit, self.measured, self.trial, self.signals.get('load'))}
         return dataclasses.replace(
             self.model, effects=list(effects), length_stage=stage, metrics=metrics, replicates=[])
+
+
+def _operator(design: Design, z: np.ndarray) -> Preisach:
+    """Return H2 with weights (K + 1,) times the sizes of their cells, its bias aside."""
+    return operator_with(design.nodes, z[:-1] / weight_sizes(design.nodes), 0.0)
 
 
 def _remember(found: dict[tuple, Entry], key: tuple, value: Entry) -> None:

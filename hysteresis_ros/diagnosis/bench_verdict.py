@@ -10,8 +10,10 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis import verdict
+from hysteresis_ros.diagnosis.bench_kinetics import shown_kinetics
 from hysteresis_ros.diagnosis.bench_selection import BenchSelection
 from hysteresis_ros.diagnosis.residual import shares, unexplained_signal
+from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.measurements.metrics import sample_noise
 
 if TYPE_CHECKING:
@@ -77,7 +79,22 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
         rmse_after=selection.typical_rmse(selection.found), pooled_before=selection.error(base),
         pooled_after=selection.error(selection.found), small_error=selection.problem.small_error,
         not_excited=hidden, event=None,
-        signal=unexplained_signal(problem, residual) if unknown else '', resembles=resembles)
+        signal=unexplained_signal(problem, residual) if unknown else '', resembles=resembles,
+        kinetics=None if unknown else _kinetics(selection))
+
+
+def _kinetics(selection: BenchSelection) -> dict[str, Any] | None:
+    """Return what kinetics explain of loads held out beside the effects found; see `Diagnosis`."""
+    if selection.problem.catalogue is not None:
+        return None     # tried as any other effect, or not asked for
+    shown = shown_kinetics(
+        selection.fitter, selection.found.effects, selection.settings.practical)
+    if shown is None:
+        return None
+    size, = Kinetics.parameters
+    return {'effect': Kinetics.id, size.name: shown.effects[-1].values[size.name],
+            'rmse_before': selection.typical_rmse(shown.before),
+            'rmse_after': selection.typical_rmse(shown.after)}
 
 
 def _sensor_noise(problem: BenchProblem) -> float:

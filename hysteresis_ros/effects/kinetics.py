@@ -13,17 +13,18 @@ class Kinetics(MaterialEffect):
 
     The branches of a Preisach operator meet again where they have parted. Those of the usual
     kinetics of martensite do not: a minor loop begins a little further on each time, until it fits
-    in. A bench of damped oscillations goes through each minor loop once, and the weights of H2 can
-    follow it whatever its kind; on an arm that turns to and fro in the middle of its way they are
-    off by degrees. The major loop stays that of H2, and so does the share of the transformation
-    that does not follow the kinetics.
+    in. The weights of H2 can follow the minor loops of a bench one by one, but those of a load left
+    out are off, and on an arm that turns to and fro in the middle of its way angles by degrees. The
+    major loop stays that of H2, and so does the share of the transformation that does not follow
+    the kinetics.
 
-    It is a property of the wire that few benches show, so it is part of the base model's own error,
-    and not what an arm lacks that runs as it always did. Who wants to know it names it, as in
-    ``diagnose(model, data, effects=[...])``.
+    It is a property of the wire, which is sought on a bench. What a bench does not show of it is
+    part of the base model's own error, and not what an arm lacks that runs as it always did. Who
+    wants to know it from an arm names it, as in ``diagnose(model, data, effects=[...])``.
     """
 
     id = 'kinetics'
+    kinds = ('arm', 'bench')
     sentence = ('What transforms is in proportion to what has still to transform, so that minor '
                 'loops do not close.')
     equation = ('y = (1 - share) H2[u] + share Y, dY = (Y1 - Y) dR / (Y1 - R) while u rises and '

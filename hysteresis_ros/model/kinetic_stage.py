@@ -42,8 +42,27 @@ def with_kinetics(model: MuscleModel, chain: Chain, stage: HysteresisOperator
         If no kinetics of this operator are known.
     """
     share = chain.kinetics
-    if share == 0.0:
-        return stage
+    return stage if share == 0.0 else kinetic_stage(model, chain, stage, share)
+
+
+def kinetic_stage(model: MuscleModel, chain: Chain, stage: HysteresisOperator, share: float
+                  ) -> Kinetic:
+    """
+    Return H2 with kinetics of a share, whatever that of the effects is; see `with_kinetics`.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    chain : Chain
+    stage : HysteresisOperator
+    share : float
+        From 0 to 1.
+
+    Raises
+    ------
+    ParameterError
+        If no kinetics of this operator are known.
+    """
     stage = contracting(
         model, stage, 'a wire whose minor loops follow its kinetics (effect kinetics)')
     first = model.first_stage(chain)

@@ -45,6 +45,8 @@ def after_diagnosis(found: Diagnosis, model: str, data: Sequence[str], origin: O
     missing = [] if any(found.alternatives) else found.missing
     if found.verdict == 'adequate':
         missing = [one['effect'] for one in (found.kept_strain, found.kinetics) if one]
+    elif missing and found.kinetics and found.pooled_before is not None:
+        missing = [*missing, found.kinetics['effect']]
     if missing:
         return shlex.join([
             'hysteresis', 'extend', '--model', model, '--add', ','.join(missing), '--data',

@@ -33,25 +33,27 @@ def verdict_in_words(found: Diagnosis) -> str:
     """
     kept, kinetics = found.kept_strain, found.kinetics
     sentences = [_verdict(found)]
+    on_bench = found.pooled_before is not None
     if kept is not None:
         sentences.append(_wire_in_words(
             found, kept, 'no bench of constant loads shows',
             f'martensite that keeps {100.0 * kept["kept"]:.0f} % of its strain'))
     if kinetics is not None:
         sentences.append(_wire_in_words(
-            found, kinetics, 'a bench with few minor loops does not show',
+            found, kinetics, '' if on_bench else 'a bench with few minor loops does not show',
             f'minor loops that do not close, because {100.0 * kinetics["share"]:.0f} % of what '
             'transforms is in proportion to what has still to,'))
     return ' '.join(sentences)
 
 
-def _wire_in_words(found: Diagnosis, own: dict[str, Any], shown_by: str, what: str) -> str:
-    """Say what a property of the wire itself would explain of a residual."""
+def _wire_in_words(found: Diagnosis, own: dict[str, Any], hidden_from: str, what: str) -> str:
+    """Say what a property of the wire itself would explain of a residual, or has explained."""
     unit, scale = shown(found.quantity)
     before, after = (f'{scale * own[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
-    return (f'The residual of {before} {unit} may be that of the wire itself, in a way that '
-            f'{shown_by}: with {what} it is {after} {unit}; `extend --add {own["effect"]}` adds '
-            'it.')
+    residual = (f'The residual of {before} {unit} may be that of the wire itself, in a way that '
+                f'{hidden_from}:' if hidden_from else
+                f'Loads held out show the wire itself: their typical RMSE is {before} {unit}, and')
+    return f'{residual} with {what} it is {after} {unit}; `extend --add {own["effect"]}` adds it.'
 
 
 def _verdict(found: Diagnosis) -> str:

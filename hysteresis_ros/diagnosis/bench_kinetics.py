@@ -1,0 +1,94 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether loads held out on a bench show minor loops that do not close (`effects.kinetics`).
+
+The weights of H2 follow the minor loops of the loads that they are fitted to, whatever these are.
+They cannot do so for a load that they have not seen, and what is predicted there tells the kinetics
+of the wire. That is looked at beside what the bench is said to lack, because each wire has kinetics
+and no other effect stands for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import dataclasses
+
+import numpy as np
+
+from hysteresis_ros.diagnosis.arm_fit import Fit
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.significance import typical_error
+from hysteresis_ros.effects import Effect
+from hysteresis_ros.effects.kinetics import Kinetics
+
+
+@dataclasses.dataclass
+class Shown:
+    """
+    What the loads of a bench show with kinetics.
+
+    Attributes
+    ----------
+    effects : list of Effect
+        Those found before and, last, `Kinetics`, fitted together, with intervals.
+    before, after : Fit
+        Cross-validated.
+    """
+
+    effects: list[Effect]
+    before: Fit
+    after: Fit
+
+
+def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: float) -> Shown | None:
+    """
+    Return the effects found on a bench with the kinetics of the wire.
+
+    Parameters
+    ----------
+    fitter : BenchFitter
+        Rows, and a model without the effects.
+    found : sequence of Effect
+        Effects with values.
+    practical : float
+        Share by which the typical error of loads held out has to fall.
+
+    Returns
+    -------
+    Shown or None
+        None where the rows do not determine the share, or loads held out are not predicted better
+        by what matters.
+    """
+    problem = fitter.problem
+    surroundings = problem.model.surroundings
+    known = {effect.id for effect in (*fitter.fixed, *found)}
+    if Kinetics.id in known or not Kinetics.available(surroundings):
+        return None
+    with np.errstate(all='ignore'):
+        own = fitter
+        after = own.search(found, Kinetics(surroundings))
+        effects = _with_intervals(own, after)
+        # What was told by loads held out the rows fitted need not tell.
+        kept = [one for one, fitted in zip(found, effects) if not_determined(fitted, problem.kind)]
+        if kept:
+            own = fitter.apart()
+            own.fixed = [*fitter.fixed, *kept]
+            after = own.search([one for one in found if one not in kept], Kinetics(surroundings))
+            effects = _with_intervals(own, after)
+        if not effects or after.implausible() or any(
+                not_determined(effect, problem.kind) for effect in effects):
+            return None
+        before, after = fitter.cross_validate(fitter.fit(found)), own.cross_validate(after)
+    # What is little on a bench, which goes through each minor loop once, may be much on an arm.
+    errors = [float(typical_error(problem.squares(fit.held_out), problem.noise))
+              for fit in (before, after)]
+    # A comparison that NaN does not pass.
+    return Shown([*kept, *effects], before, after) if errors[1] <= (
+        1.0 - practical) * errors[0] else None
+
+
+def _with_intervals(fitter: BenchFitter, fit: Fit) -> list[Effect]:
+    """Return the effects of a fit with intervals; none where it is not finite."""
+    return fitter.with_intervals(fit) if np.all(np.isfinite(fit.predicted)) else []

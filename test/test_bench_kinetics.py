@@ -1,0 +1,141 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Minor loops that do not close, on a bench: in the fit of its weights, found, and said."""
+
+import dataclasses
+
+from model_support import autoregressive, effect_of, with_noise
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.bench_kinetics import shown_kinetics
+from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.laboratory.experiments import bench_tables
+from hysteresis_ros.measurements import Measurement
+from hysteresis_ros.report.commands import after_diagnosis
+from hysteresis_ros.report.provenance import Origin
+from hysteresis_ros.report.words import verdict_in_words
+
+TRIALS = {'length_trials': range(4), 'force_trials': [0]}
+USUAL = ['stress_dependence', 'stress_dependent_strain', 'series_compliance']
+NOISE, PRACTICAL = 2e-5, 0.05
+LOADS, ROWS = (1.2, 3.1, 5.1, 7.0), 120
+
+
+@pytest.fixture(scope='module')
+def force():
+    """Return the force table of a bench."""
+    return Measurement.from_columns(bench_tables({}, 11)['force.csv'])
+
+
+@pytest.fixture(scope='module')
+def usual(force):
+    """Return a model of its wire with what every loaded muscle has, whose loops close."""
+    length = Measurement.from_columns(bench_tables({}, 11)['length.csv'])
+    plain = identify(length, force, **TRIALS).model
+    return add_effects(plain, length, force, USUAL, **TRIALS)[0]
+
+
+def made(model, share, rho=0.0, seed=0, noise=NOISE, loads=LOADS):
+    """Return lengths of a wire of which a share follows its kinetics, with small loops repeated."""
+    corners = [0.0, 6.0, 0.0, *np.tile([4.2, 2.8], 5), 6.0, *np.tile([1.8, 3.4], 5), 0.0]
+    drive = np.interp(np.linspace(0.0, len(corners) - 1.0, ROWS), np.arange(len(corners)), corners)
+    columns = {'trial': np.repeat(np.arange(float(len(loads))), ROWS),
+               'voltage': np.tile(drive, len(loads)), 'force': np.repeat(loads, ROWS)}
+    clean = Measurement.from_columns({**columns, 'length': np.zeros(ROWS * len(loads))})
+    own = [effect_of(model, 'kinetics', share=share)] if share else []
+    lengths = model.with_effects([*model.effects, *own]).predict(clean)
+    return with_noise(Measurement.from_columns({**columns, 'length': lengths}),
+                      noise * autoregressive(
+                          np.random.default_rng(seed), len(loads), ROWS, rho))
+
+
+def fitter_of(model, measured, **changes):
+    """Return a fitter of lengths with another model, as that without effects by default."""
+    bare = dataclasses.replace(model, replicates=[], **{'effects': [], **changes})
+    return BenchFitter(problem_for(bare, [measured]).finer())
+
+
+def test_weights_and_kinetics_are_fitted_to_each_other(usual):
+    """What a bench with kinetics is fitted to is what the completed model predicts of it."""
+    length = made(usual, 0.8)
+    kinetics = effect_of(usual, 'kinetics', share=0.8)
+    problem = problem_for(dataclasses.replace(usual, effects=[], replicates=[]), [length])
+    without, response = (problem.simulate(effects) - problem.measured for effects in (
+        usual.effects, [*usual.effects, kinetics]))
+    assert np.std(response) < 2.0 * NOISE < 0.5 * np.std(without)
+    whole = problem.completed([*usual.effects, kinetics])
+    assert np.std(whole.predict(length) - length.column('length')) < 2.0 * NOISE
+    # As without that effect where none follows the kinetics.
+    none = effect_of(usual, 'kinetics', share=0.0)
+    assert problem.simulate([*usual.effects, none]) == pytest.approx(without + problem.measured)
+
+
+@pytest.mark.parametrize('share', [0.5, 0.9])
+def test_loads_held_out_tell_the_share(usual, share):
+    length = made(usual, share)
+    fitter = fitter_of(usual, length)
+    shown = shown_kinetics(fitter, usual.effects, PRACTICAL)
+    assert {effect.id for effect in shown.effects} == {*USUAL, 'kinetics'}
+    assert all(effect.intervals for effect in shown.effects)
+    kinetics = shown.effects[-1]
+    assert kinetics.share == pytest.approx(share, abs=0.05)
+    low, high = kinetics.intervals['share']
+    assert low - 0.02 < share < high + 0.02 and high - low < 0.2
+    assert fitter.error(shown.after.held_out) < 0.5 * fitter.error(shown.before.held_out)
+
+
+@pytest.mark.parametrize('rho', [0.0, 0.9])
+def test_no_bench_whose_loops_close_shows_them(usual, rho):
+    """Whatever its noise, which may last for ten rows."""
+    for seed in range(8):
+        length = made(usual, 0.0, rho, seed, 2e-4)
+        assert shown_kinetics(fitter_of(usual, length), usual.effects, PRACTICAL) is None
+
+
+def test_they_are_looked_for_once_and_where_a_muscle_can_have_them(usual):
+    length = made(usual, 0.8)
+    own = effect_of(usual, 'kinetics', share=0.3)
+    assert shown_kinetics(fitter_of(usual, length), [*usual.effects, own], PRACTICAL) is None
+    assert shown_kinetics(fitter_of(usual, length, effects=[own]), usual.effects, PRACTICAL) is None
+    pushed = fitter_of(usual, length)
+    pushed.problem.model = dataclasses.replace(usual, sign=1)
+    assert shown_kinetics(pushed, usual.effects, PRACTICAL) is None
+    # Loads that are predicted better already would have to be so by more.
+    assert shown_kinetics(fitter_of(usual, length), usual.effects, 0.99) is None
+
+
+def test_a_diagnosis_of_a_bench_says_what_they_explain(usual):
+    length = made(usual, 0.8)
+    found = diagnose(usual, [length])
+    assert (found.verdict, found.missing) == ('adequate', [])
+    kinetics = found.to_dict()['kinetics']
+    assert kinetics['effect'] == 'kinetics' and kinetics['share'] == pytest.approx(0.8, abs=0.1)
+    assert 2.0 * kinetics['rmse_after'] < kinetics['rmse_before'] == pytest.approx(
+        found.rmse_before)
+    words = verdict_in_words(found)
+    assert 'Loads held out show' in words and '`extend --add kinetics` adds it' in words
+    command = after_diagnosis(found, 'm.yaml', ['l.csv'], Origin())
+    assert 'extend --model m.yaml --add kinetics ' in command
+    more = dataclasses.replace(found, verdict='missing', missing=['creep'], alternatives=[[]])
+    assert '--add creep,kinetics ' in after_diagnosis(more, 'm.yaml', ['l.csv'], Origin())
+    # Who names effects asks for no other.
+    assert diagnose(usual, [length], ['creep']).kinetics is None
+    assert diagnose(usual, [made(usual, 0.0)]).kinetics is None
+
+
+@pytest.mark.slow
+def test_identification_adds_them_to_what_the_bench_proves(usual, force):
+    length = made(usual, 0.8, loads=(*LOADS, 4.0))
+    plain = identify(length, force, **TRIALS).model
+    whole, added = add_effects(plain, length, force, **TRIALS)
+    assert {effect.id for effect in added} == {*USUAL, 'kinetics'}
+    assert added[-1].share == pytest.approx(0.8, abs=0.1)
+    before = add_effects(plain, length, force, USUAL, **TRIALS)[0]
+    assert (whole.metrics['length']['verification']['rmse']
+            < 0.5 * before.metrics['length']['verification']['rmse'])
+    assert all('kinetics' in {effect.id for effect in one.effects} for one in whole.replicates)
