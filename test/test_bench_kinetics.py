@@ -99,7 +99,10 @@ def test_rows_held_out_are_the_same_whatever_was_fitted_before(usual):
 def test_loads_held_out_tell_the_share(usual, share):
     length = made(usual, share)
     fitter = fitter_of(usual, length)
-    shown = shown_kinetics(fitter, usual.effects, PRACTICAL)
+    # However little of the range it is: on an arm that goes to and fro it is more.
+    least = 0.01 * np.ptp(length.column('length'))
+    assert fitter.error(fitter.fit(usual.effects).predicted) < least
+    shown = shown_kinetics(fitter, usual.effects, 0.3)
     assert {effect.id for effect in shown.effects} == {*USUAL, 'kinetics'}
     assert all(effect.intervals for effect in shown.effects)
     kinetics = shown.effects[-1]
