@@ -129,7 +129,8 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     known = _with_universal(
         model, [effect for effect in found if effect.id not in excluded], problem, excluded)
     if Kinetics.id not in excluded:
-        shown = shown_kinetics(BenchFitter(problem.finer()), known, Settings().practical)
+        shown = shown_kinetics(BenchFitter(problem.finer()), known, Settings().practical,
+                               np.random.default_rng(0))
         known = shown.effects if shown else known
     if not known:
         return model, []

@@ -19,7 +19,7 @@ import numpy as np
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.determined import not_determined
-from hysteresis_ros.diagnosis.significance import typical_error
+from hysteresis_ros.diagnosis.significance import typical_gain_interval
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.effects.kinetics import Kinetics
 
@@ -42,7 +42,8 @@ class Shown:
     after: Fit
 
 
-def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: float) -> Shown | None:
+def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: float,
+                   rng: np.random.Generator) -> Shown | None:
     """
     Return the effects found on a bench with the kinetics of the wire.
 
@@ -53,13 +54,14 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
     found : sequence of Effect
         Effects with values.
     practical : float
-        Share by which the typical error of loads held out has to fall.
+        Share by which the typical RMSE of loads held out has to fall for sure.
+    rng : numpy.random.Generator
 
     Returns
     -------
     Shown or None
-        None where the rows do not determine the share, or loads held out are not predicted better
-        by what matters.
+        None where the rows do not determine the share, or loads held out are not sure to be
+        predicted better by what matters.
     """
     problem = fitter.problem
     surroundings = problem.model.surroundings
@@ -82,11 +84,11 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
             return None
         before, after = fitter.cross_validate(fitter.fit(found)), own.cross_validate(after)
     # What is little on a bench, which goes through each minor loop once, may be much on an arm.
-    errors = [float(typical_error(problem.squares(fit.held_out), problem.noise))
-              for fit in (before, after)]
+    gain, _ = typical_gain_interval(
+        problem.measured - before.held_out, problem.measured - after.held_out, problem.block,
+        problem.fold, problem.noise, rng)
     # A comparison that NaN does not pass.
-    return Shown([*kept, *effects], before, after) if errors[1] <= (
-        1.0 - practical) * errors[0] else None
+    return Shown([*kept, *effects], before, after) if gain >= practical else None
 
 
 def _with_intervals(fitter: BenchFitter, fit: Fit) -> list[Effect]:

@@ -76,7 +76,7 @@ class BenchSelection:
     def __init__(self, problem: BenchProblem, settings: Settings, rng: np.random.Generator,
                  jobs: int, progress: Progress) -> None:
         self.problem, self.settings = problem.finer(), settings
-        self.fitter, self._rng = BenchFitter(self.problem), rng
+        self.fitter, self.rng = BenchFitter(self.problem), rng
         self.base = self.found = self.fitter.cross_validate(self.fitter.fit([]))
         self.names, self.unobservable = observable(problem)
         self._search = BenchSearch(problem, self.fitter, self.names, settings.most_on_bench, jobs,
@@ -270,7 +270,7 @@ class BenchSelection:
         problem = self.problem
         before, after = (problem.measured - one.held_out for one in (base, fit))
         return significance.typical_gain_interval(
-            before, after, problem.block, problem.fold, problem.small_error, self._rng)
+            before, after, problem.block, problem.fold, problem.small_error, self.rng)
 
     def _typical(self, response: np.ndarray, least: float) -> float:
         """Return the typical error of a response (n,), differences below `least` aside."""
@@ -327,7 +327,7 @@ class BenchSelection:
         if not fits:
             return np.zeros(0)
         return significance.paired_p_values(
-            np.stack([self._gains(fit, base) for fit in fits]), self._rng, self.settings.draws)
+            np.stack([self._gains(fit, base) for fit in fits]), self.rng, self.settings.draws)
 
     def _helps(self, fit: Fit) -> bool:
         """Whether a fit explains enough of held-out rows to matter, and helps in most blocks."""
@@ -342,7 +342,7 @@ class BenchSelection:
         if self.typical_error(rival) <= largest:
             return True
         theirs, own = (self.problem.measured - fit.held_out for fit in (rival, self.found))
-        low, _ = significance.gain_interval(theirs, own, self.problem.block, self._rng)
+        low, _ = significance.gain_interval(theirs, own, self.problem.block, self.rng)
         return low <= 0.0
 
     def alternatives(self) -> dict[str, list[str]]:

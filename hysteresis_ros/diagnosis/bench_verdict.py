@@ -88,7 +88,7 @@ def _kinetics(selection: BenchSelection) -> dict[str, Any] | None:
     if selection.problem.catalogue is not None:
         return None     # tried as any other effect, or not asked for
     shown = shown_kinetics(
-        selection.fitter, selection.found.effects, selection.settings.practical)
+        selection.fitter, selection.found.effects, selection.settings.practical, selection.rng)
     if shown is None:
         return None
     size, = Kinetics.parameters
