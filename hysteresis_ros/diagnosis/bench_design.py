@@ -97,21 +97,21 @@ class Excitation:
 
 
 @dataclasses.dataclass
-class Shown:
+class Feedback:
     """
-    What H2 shows with some weights that the best ones depend on.
+    What H2 with some weights does that the best ones depend on.
 
     Attributes
     ----------
     phases : list of ndarray or None
         Martensite share in every row of each trial; None where no effect looks at it.
-    beyond : ndarray, shape (rows,), or None
-        What H2 would give beyond its output if all of the wire followed the kinetics of `Kinetics`;
-        None where none of it does.
+    kinetics : ndarray, shape (rows,), or None
+        What its output would change by if all of the wire followed the kinetics of `Kinetics`; None
+        where none of it does.
     """
 
     phases: list[np.ndarray] | None
-    beyond: np.ndarray | None
+    kinetics: np.ndarray | None
 
 
 @dataclasses.dataclass

@@ -25,7 +25,7 @@ from hysteresis_ros.effects.kinetics import Kinetics
 
 
 @dataclasses.dataclass
-class Shown:
+class BenchKinetics:
     """
     What the loads of a bench show with kinetics.
 
@@ -43,7 +43,7 @@ class Shown:
 
 
 def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: float,
-                   rng: np.random.Generator) -> Shown | None:
+                   rng: np.random.Generator) -> BenchKinetics | None:
     """
     Return the effects found on a bench with the kinetics of the wire.
 
@@ -59,7 +59,7 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
 
     Returns
     -------
-    Shown or None
+    BenchKinetics or None
         None where the rows do not determine the share, or loads held out are not sure to be
         predicted better by what matters.
     """
@@ -88,7 +88,7 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
         problem.measured - before.held_out, problem.measured - after.held_out, problem.block,
         problem.fold, problem.noise, rng)
     # A comparison that NaN does not pass.
-    return Shown([*kept, *effects], before, after) if gain >= practical else None
+    return BenchKinetics([*kept, *effects], before, after) if gain >= practical else None
 
 
 def _with_intervals(fitter: BenchFitter, fit: Fit) -> list[Effect]:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from hysteresis_ros.diagnosis.bench_design import (
-    Course, Design, Excitation, operator_with, Shown, weight_sizes)
+    Course, Design, Excitation, operator_with, Feedback, weight_sizes)
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
@@ -53,7 +53,7 @@ SEARCH_STRENGTH = 3e-9
 HELD_OUT_STRENGTH = 1e-9
 # Courses that are remembered, those of the latest effects.
 MOST_COURSES = 20
-# How often weights and what they show are fitted to each other.
+# How often weights and their feedback are fitted to each other.
 PASSES = 2
 # The same at most for weights and kinetics, which are fitted to each other until what these give
 # changes by less than the share of the response's spread: on twelve benches four passes do.
@@ -81,7 +81,7 @@ class Solution:
 
     weights: ProjectedWeights
     predicted: np.ndarray
-    shown: Shown | None
+    feedback: Feedback | None
 
 
 class BenchProblem(Problem):
@@ -123,7 +123,7 @@ class BenchProblem(Problem):
         self._excitations: dict[tuple, Excitation] = {}
         self._phases_of: tuple | None = None
         self._known_phases: list[np.ndarray] = []
-        self._known_beyond: np.ndarray | None = None
+        self._known_kinetics: np.ndarray | None = None
 
     def finer(self) -> BenchProblem:
         """Return the same rows with H2 on the grid on which sets of effects are judged."""
@@ -152,7 +152,7 @@ class BenchProblem(Problem):
             Those of a neighbouring problem that are not at their bound, and the bias.
         """
         self._passive = {} if passive is None else {None: passive}
-        self._known_beyond = None
+        self._known_kinetics = None
 
     def holding_out(self) -> BenchProblem:
         """Return the same rows and grid, with weights regularised as for rows held out."""
@@ -194,40 +194,40 @@ class BenchProblem(Problem):
         return np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
 
     def _design(self, effects: Sequence[Effect], levels: int | None = None,
-                train: np.ndarray | None = None, shown: Shown | None = None,
+                train: np.ndarray | None = None, feedback: Feedback | None = None,
                 columns: np.ndarray | None = None) -> Design:
-        course = self._course(effects, shown or self._shown(effects, train))
+        course = self._course(effects, feedback or self._feedback(effects, train))
         levels = levels or self.levels
         scale, known = (column[self._judged] for column in (course.scales, course.known))
         return Design(course.excitation.shares(levels, scale, columns), known,
                       course.excitation.nodes(levels), course.excitation.smoothness(levels))
 
-    def _course(self, effects: Sequence[Effect], shown: Shown | None) -> Course:
+    def _course(self, effects: Sequence[Effect], feedback: Feedback | None) -> Course:
         key = tuple((effect.id, *effect.values.values()) for effect in effects)
-        if shown is not None or key not in self._courses:
-            course = self._new_course(Chain(effects, self._surroundings), shown)
-            if shown is not None:
+        if feedback is not None or key not in self._courses:
+            course = self._new_course(Chain(effects, self._surroundings), feedback)
+            if feedback is not None:
                 return course
             # Folds that are held out in turn begin at the same effects.
             _remember(self._courses, key, course)
         return self._courses[key]
 
-    def _new_course(self, chain: Chain, shown: Shown | None) -> Course:
+    def _new_course(self, chain: Chain, feedback: Feedback | None) -> Course:
         load, cold = self._load, chain.to_drive_squared(self.model.cold_drive)
         driven: list[Any] = []
         drifts: list[tuple[np.ndarray, np.ndarray]] = []
         for number, trial in enumerate(self._trials):
             inputs = trial.inputs
-            if shown is not None and shown.phases is not None:
-                inputs = inputs._replace(phase=shown.phases[number])
+            if feedback is not None and feedback.phases is not None:
+                inputs = inputs._replace(phase=feedback.phases[number])
             squared = chain.drive_squared(trial.drive, inputs)
             driven += [[cold], squared]
             if chain.drifts:
                 drifts.append(chain.drift(trial.drive, squared, inputs))
         offset, factor = np.concatenate(drifts, axis=1) if drifts else (0.0, 1.0)
         scales, known = chain.scale(load) * factor + 0.0 * load, chain.stretch(load) + offset
-        if shown is not None and shown.beyond is not None:
-            known = known + chain.kinetics * scales * shown.beyond
+        if feedback is not None and feedback.kinetics is not None:
+            known = known + chain.kinetics * scales * feedback.kinetics
         return Course(self._excitation(chain, np.concatenate(driven)), scales, known)
 
     def _excitation(self, chain: Chain, squared: np.ndarray) -> Excitation:
@@ -258,41 +258,41 @@ class BenchProblem(Problem):
             begin = end
         return x
 
-    def _shown(self, effects: Sequence[Effect], train: np.ndarray | None) -> Shown | None:
-        """Return what the best weights show of what they depend on; None where it is nothing."""
+    def _feedback(self, effects: Sequence[Effect], train: np.ndarray | None) -> Feedback | None:
+        """Return what the best weights do that they depend on; None where it is nothing."""
         phases = self._phases(effects, train) if needs_phase(effects) else None
         if Chain(effects, self._surroundings).kinetics > 0.0:
-            return Shown(phases, self._beyond(effects, train, phases))
-        return None if phases is None else Shown(phases, None)
+            return Feedback(phases, self._kinetics(effects, train, phases))
+        return None if phases is None else Feedback(phases, None)
 
-    def _beyond(self, effects: Sequence[Effect], train: np.ndarray | None,
-                phases: list[np.ndarray] | None) -> np.ndarray:
+    def _kinetics(self, effects: Sequence[Effect], train: np.ndarray | None,
+                  phases: list[np.ndarray] | None) -> np.ndarray:
         """Return what kinetics of all of the wire add to H2 with its best weights, (rows,)."""
-        def made(beyond: np.ndarray) -> np.ndarray:
-            shown = Shown(phases, beyond)
-            design = self._design(effects, train=train, shown=shown)
+        def made(kinetics: np.ndarray) -> np.ndarray:
+            feedback = Feedback(phases, kinetics)
+            design = self._design(effects, train=train, feedback=feedback)
             z = self._projected(design, train).z
-            return self._made_by_kinetics(effects, _operator(design, z), shown)
+            return self._made_by_kinetics(effects, _operator(design, z), feedback)
 
         # What neighbouring parameters gave, or neighbouring rows, is near.
-        begin = np.zeros(len(self._load)) if self._known_beyond is None else self._known_beyond
-        self._known_beyond = fixed_point(
+        begin = np.zeros(len(self._load)) if self._known_kinetics is None else self._known_kinetics
+        self._known_kinetics = fixed_point(
             made, begin, SETTLED * float(np.std(self.measured)), MOST_PASSES)
-        return self._known_beyond
+        return self._known_kinetics
 
-    def _made_by_kinetics(self, effects: Sequence[Effect], stage: Preisach, shown: Shown
+    def _made_by_kinetics(self, effects: Sequence[Effect], stage: Preisach, feedback: Feedback
                           ) -> np.ndarray:
         """Return what kinetics of all of the wire add to the output of an H2, shape (rows,)."""
         whole = kinetic_stage(self.model, Chain(effects, self._surroundings), stage, 1.0)
-        kinetic, plain = (np.concatenate(self._outputs(effects, one, shown))
+        kinetic, plain = (np.concatenate(self._outputs(effects, one, feedback))
                           for one in (whole, stage))
         return kinetic - plain
 
-    def _outputs(self, effects: Sequence[Effect], stage: HysteresisOperator, shown: Shown | None
-                 ) -> list[np.ndarray]:
+    def _outputs(self, effects: Sequence[Effect], stage: HysteresisOperator,
+                 feedback: Feedback | None) -> list[np.ndarray]:
         """Return what an H2 gives in every row of each trial."""
         found = []
-        inputs = self._course(effects, shown).excitation.inputs
+        inputs = self._course(effects, feedback).excitation.inputs
         for part in np.split(inputs, self._ends[:-1]):
             stage.reset()
             stage.step(part[0])
@@ -310,25 +310,27 @@ class BenchProblem(Problem):
         key = (None if train is None else train.tobytes(),
                *((effect.id, *effect.values.items()) for effect in effects))
         if key != self._phases_of:
-            shown = self._shown(effects, train)
-            design = self._design(effects, train=train, shown=shown)
+            feedback = self._feedback(effects, train)
+            design = self._design(effects, train=train, feedback=feedback)
             stage = _operator(design, self._projected(design, train).z)
-            self._known_phases = self._phases_with(effects, stage, shown)
+            self._known_phases = self._phases_with(effects, stage, feedback)
             self._phases_of = key
         return self._known_phases
 
-    def _phases_with(self, effects: Sequence[Effect], stage: Preisach, shown: Shown | None
+    def _phases_with(self, effects: Sequence[Effect], stage: Preisach, feedback: Feedback | None
                      ) -> list[np.ndarray]:
         """Return the martensite share that an H2 shows in every row of each trial."""
         model = dataclasses.replace(self.model, length_stage=stage)
         whole = with_kinetics(self.model, Chain(effects, self._surroundings), stage)
-        return [model.martensite(output) for output in self._outputs(effects, whole, shown)]
+        return [model.martensite(output) for output in self._outputs(effects, whole, feedback)]
 
-    def _shown_with(self, effects: Sequence[Effect], stage: Preisach, shown: Shown) -> Shown:
-        """Return what an H2 shows of what was shown by another one."""
-        phases = None if shown.phases is None else self._phases_with(effects, stage, shown)
-        return Shown(phases, None if shown.beyond is None
-                     else self._made_by_kinetics(effects, stage, shown))
+    def _feedback_with(self, effects: Sequence[Effect], stage: Preisach, feedback: Feedback
+                       ) -> Feedback:
+        """Return the feedback of an H2, of the kinds that that of another one has."""
+        phases = None if feedback.phases is None else self._phases_with(effects, stage, feedback)
+        kinetics = (None if feedback.kinetics is None
+                    else self._made_by_kinetics(effects, stage, feedback))
+        return Feedback(phases, kinetics)
 
     def fit_stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray | None = None
                   ) -> tuple[WeightFit, Design]:
@@ -352,17 +354,17 @@ class BenchProblem(Problem):
         groups = self.trial[rows]
         if len(np.unique(groups)) == 1:
             groups = self.block[rows]
-        shown = self._shown(effects, train)
-        for remaining in range(PASSES if shown else 0, -1, -1):
-            design = self._design(effects, levels, shown=shown)
+        feedback = self._feedback(effects, train)
+        for remaining in range(PASSES if feedback else 0, -1, -1):
+            design = self._design(effects, levels, feedback=feedback)
             fit = fit_weights(
                 design.rows[rows], (self.measured - design.known)[rows], groups=groups,
                 scale=weight_sizes(design.nodes), slack=SLACK,
                 penalty=smoothness(design.nodes, reversible=True))
-            if remaining and shown:
-                # These weights, which are smoother, do not show quite the same.
-                shown = self._shown_with(
-                    effects, operator_with(design.nodes, fit.weights, fit.bias), shown)
+            if remaining and feedback:
+                # That of these weights, which are smoother, is not quite the same.
+                feedback = self._feedback_with(
+                    effects, operator_with(design.nodes, fit.weights, fit.bias), feedback)
         return fit, design
 
     def stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray) -> Preisach:
@@ -385,17 +387,17 @@ class BenchProblem(Problem):
         train : ndarray of bool, shape (n,), optional
             Rows to fit; all by default.
         """
-        shown = self._shown(effects, train)
-        design = self._design(effects, shown=shown)
+        feedback = self._feedback(effects, train)
+        design = self._design(effects, feedback=feedback)
         weights = self._projected(design, train)
-        return Solution(weights, self._response(effects, design, weights.z), shown)
+        return Solution(weights, self._response(effects, design, weights.z), feedback)
 
     def near(self, solution: Solution, effects: Sequence[Effect],
              train: np.ndarray | None = None) -> np.ndarray:
         """
         Return the response for effects that differ a little from those of a solution.
 
-        Weights that are zero stay so, and so does what they have shown.
+        Weights that are zero stay so, and so does the feedback.
 
         Parameters
         ----------
@@ -406,7 +408,7 @@ class BenchProblem(Problem):
             The rows that the solution was fitted to.
         """
         columns = solution.weights.columns
-        design = self._design(effects, shown=solution.shown, columns=columns)
+        design = self._design(effects, feedback=solution.feedback, columns=columns)
         penalty = self._strength * part_of(design.smoothness, columns)
         penalty.flat[::len(columns) + 1] += self._further(design, train) * np.diag(penalty)
         z = solution.weights.moved(*self._rows(design, train), penalty)
