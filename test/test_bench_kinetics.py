@@ -63,7 +63,7 @@ def fitter_of(model, measured, **changes):
     return BenchFitter(problem_for(bare, [measured]).finer())
 
 
-def looked_for(fitter, effects, practical=PRACTICAL):
+def sought(fitter, effects, practical=PRACTICAL):
     """Return what loads held out show."""
     return shown_kinetics(fitter, effects, practical, np.random.default_rng(0))
 
@@ -83,7 +83,7 @@ def test_weights_and_kinetics_are_fitted_to_each_other(usual):
     assert problem.simulate([*usual.effects, none]) == pytest.approx(without + problem.measured)
 
 
-def test_what_looks_at_the_phase_sees_that_of_the_kinetics(usual):
+def test_effects_of_the_phase_get_that_of_the_kinetics(usual):
     creeping = usual.with_effects([*usual.effects, effect_of(usual, 'creep', c=0.5)])
     length, kinetics = made(creeping, 0.9), effect_of(usual, 'kinetics', share=0.9)
     problem = problem_for(dataclasses.replace(usual, effects=[], replicates=[]), [length])
@@ -107,7 +107,7 @@ def test_loads_held_out_tell_the_share(usual, share):
     # However little of the range it is: on an arm that goes to and fro it is more.
     least = 0.01 * np.ptp(length.column('length'))
     assert fitter.error(fitter.fit(usual.effects).predicted) < least
-    shown = looked_for(fitter, usual.effects, 0.3)
+    shown = sought(fitter, usual.effects, 0.3)
     assert {effect.id for effect in shown.effects} == {*USUAL, 'kinetics'}
     assert all(effect.intervals for effect in shown.effects)
     kinetics = shown.effects[-1]
@@ -122,26 +122,26 @@ def test_no_bench_whose_loops_close_shows_them(usual, rho):
     """Whatever its noise, which may last for ten rows."""
     for seed in range(8):
         length = made(usual, 0.0, rho, seed, 2e-4)
-        assert looked_for(fitter_of(usual, length), usual.effects) is None
+        assert sought(fitter_of(usual, length), usual.effects) is None
 
 
-def test_they_are_looked_for_once_and_where_a_muscle_can_have_them(usual, monkeypatch):
+def test_they_are_sought_once_and_where_a_muscle_can_have_them(usual, monkeypatch):
     length = made(usual, 0.8)
     own = effect_of(usual, 'kinetics', share=0.3)
-    assert looked_for(fitter_of(usual, length), [*usual.effects, own]) is None
-    assert looked_for(fitter_of(usual, length, effects=[own]), usual.effects) is None
+    assert sought(fitter_of(usual, length), [*usual.effects, own]) is None
+    assert sought(fitter_of(usual, length, effects=[own]), usual.effects) is None
     pushed = fitter_of(usual, length)
     pushed.problem.model = dataclasses.replace(usual, sign=1)
-    assert looked_for(pushed, usual.effects) is None
+    assert sought(pushed, usual.effects) is None
     with monkeypatch.context() as patched:
         patched.setattr(Fit, 'implausible', lambda fit: ['stress_dependence.C'])
-        assert looked_for(fitter_of(usual, length), usual.effects) is None
+        assert sought(fitter_of(usual, length), usual.effects) is None
     with monkeypatch.context() as patched:
         # They may as well be predicted no better by what matters.
         patched.setattr(bench_kinetics, 'typical_gain_interval', lambda *_: (0.04, 0.6))
-        assert looked_for(fitter_of(usual, length), usual.effects) is None
+        assert sought(fitter_of(usual, length), usual.effects) is None
     # Loads that are predicted better already would have to be so by more.
-    assert looked_for(fitter_of(usual, length), usual.effects, 0.99) is None
+    assert sought(fitter_of(usual, length), usual.effects, 0.99) is None
 
 
 def test_a_diagnosis_of_a_bench_says_what_they_explain(usual):
@@ -186,7 +186,7 @@ def test_identification_adds_them_to_what_the_bench_proves(usual, force, tables,
 
 
 @pytest.mark.slow
-def test_an_effect_that_is_left_out_is_not_looked_for_again(usual, force, tables):
+def test_an_effect_that_is_left_out_is_not_sought_again(usual, force, tables):
     plain = identify(tables, force, **TRIALS).model
     problem = problem_for(plain, [tables.select(range(4))])
     for excluded in ([], ['kinetics']):

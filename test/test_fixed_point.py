@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a function leaves as it is."""
+"""Fixed points of functions."""
 
 import numpy as np
 import pytest

@@ -104,7 +104,7 @@ class Feedback:
     Attributes
     ----------
     phases : list of ndarray or None
-        Martensite share in every row of each trial; None where no effect looks at it.
+        Martensite share in every row of each trial; None where no effect depends on it.
     kinetics : ndarray, shape (rows,), or None
         What its output would change by if all of the wire followed the kinetics of `Kinetics`; None
         where none of it does.

@@ -5,8 +5,8 @@ Whether loads held out on a bench show minor loops that do not close (`effects.k
 
 The weights of H2 follow the minor loops of the loads that they are fitted to, whatever these are.
 They cannot do so for a load that they have not seen, and what is predicted there tells the kinetics
-of the wire. That is looked at beside what the bench is said to lack, because each wire has kinetics
-and no other effect stands for them.
+of the wire. They are sought once the other effects are known, because each wire has kinetics and no
+other effect stands for them.
 """
 
 from __future__ import annotations
@@ -72,12 +72,12 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
         own = fitter
         after = own.search(found, Kinetics(surroundings))
         effects = _with_intervals(own, after)
-        # What was told by loads held out the rows fitted need not tell.
-        kept = [one for one, fitted in zip(found, effects) if not_determined(fitted, problem.kind)]
-        if kept:
+        # What loads held out have determined is not refitted to rows that do not determine it.
+        fixed = [one for one, fitted in zip(found, effects) if not_determined(fitted, problem.kind)]
+        if fixed:
             own = fitter.apart()
-            own.fixed = [*fitter.fixed, *kept]
-            after = own.search([one for one in found if one not in kept], Kinetics(surroundings))
+            own.fixed = [*fitter.fixed, *fixed]
+            after = own.search([one for one in found if one not in fixed], Kinetics(surroundings))
             effects = _with_intervals(own, after)
         if not effects or after.implausible() or any(
                 not_determined(effect, problem.kind) for effect in effects):
@@ -88,7 +88,7 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
         problem.measured - before.held_out, problem.measured - after.held_out, problem.block,
         problem.fold, problem.noise, rng)
     # A comparison that NaN does not pass.
-    return BenchKinetics([*kept, *effects], before, after) if gain >= practical else None
+    return BenchKinetics([*fixed, *effects], before, after) if gain >= practical else None
 
 
 def _with_intervals(fitter: BenchFitter, fit: Fit) -> list[Effect]:

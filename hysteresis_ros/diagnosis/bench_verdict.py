@@ -84,7 +84,7 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
 
 
 def _kinetics(selection: BenchSelection) -> dict[str, Any] | None:
-    """Return what kinetics explain of loads held out beside the effects found; see `Diagnosis`."""
+    """Return what kinetics explain of loads held out with the effects found; see `Diagnosis`."""
     if selection.problem.catalogue is not None:
         return None     # tried as any other effect, or not asked for
     shown = shown_kinetics(

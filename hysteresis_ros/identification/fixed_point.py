@@ -1,6 +1,6 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Find what a function leaves as it is, with few evaluations."""
+"""A fixed point of a function, with few evaluations."""
 
 from collections.abc import Callable
 
@@ -10,10 +10,10 @@ import numpy as np
 def fixed_point(function: Callable[[np.ndarray], np.ndarray], start: np.ndarray, tolerance: float,
                 most: int) -> np.ndarray:
     """
-    Return the last value of a function that is evaluated at its own values, until these agree.
+    Return a fixed point of a function, by Anderson's iteration with one step remembered.
 
-    From the third on at the place where the last two steps, extended as a line, would be shortest
-    (Anderson, J. ACM 12 (1965) 547, with one step remembered).
+    The function is evaluated at its own values until these agree; from the third evaluation on,
+    where the last two steps extrapolate to the shortest one (Anderson, J. ACM 12 (1965) 547).
 
     Parameters
     ----------
