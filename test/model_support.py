@@ -29,7 +29,7 @@ STRENGTHS = {
     'ambient_drift': {'offset': 0.5, 'rate': 1.0, 'curvature': -0.3},
     'stress_dependence': {'shift': 0.15}, 'stress_dependent_strain': {'r': 0.5, 'F0': 1.2},
     'series_compliance': {'compliance': 0.05}, 'transformation_slopes': {'g': 0.3},
-    'phase_modulus': {'m': 0.1},
+    'phase_modulus': {'m': 0.1}, 'thermal_expansion': {'alpha': 0.1},
     'overload': {'Fy': 1.0, 'compliance': 3.0},
     'r_phase': {'strain': 0.2, 'position': 0.2, 'width': 0.05},
     'creep': {'c': 0.1, 't0': 3.0}, 'viscoelastic_creep': {'J': 0.1, 't0': 10.0},

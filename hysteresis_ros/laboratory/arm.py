@@ -84,7 +84,7 @@ class Arm:
                    or conditions.disturbances or conditions.creep or conditions.yield_compliance)
         self._settling_dt = SETTLING_DT if coupled else math.inf
         for wire in self.muscle.wires:
-            wire.compliance = conditions.compliance
+            wire.compliance, wire.expansion = conditions.compliance, conditions.expansion
 
     def change_at(self, time: float, change: Callable[[], object]) -> None:
         """

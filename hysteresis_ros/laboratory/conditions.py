@@ -124,6 +124,8 @@ class Conditions:
         Length of each wire that hangs loose [m].
     compliance : float
         Of what is in series with each wire [m/N].
+    expansion : float
+        Coefficient of thermal expansion of the wires [1/K].
     wire_offsets : tuple of float
         By how much each wire is longer than the others [m]; one entry: the wires are alike.
     yield_tension, yield_compliance : float
@@ -166,6 +168,7 @@ class Conditions:
     tiring: float = 0.0
     dead_length: float = 0.0
     compliance: float = 0.0
+    expansion: float = 0.0
     wire_offsets: tuple = (0.0,)
     yield_tension: float = math.inf
     yield_compliance: float = 0.0

@@ -29,6 +29,9 @@ from hysteresis_ros.spelling import unknown
 SPREAD = 0.15
 # Enthalpy of the transformation [J/kg].
 ENTHALPY = 24e3
+# Coefficient of thermal expansion of both phases [1/K], as in the examples of Lagoudas and others,
+# Int. J. Plasticity 32-33 (2012) 155.
+EXPANSION = 22e-6
 
 # Changes conditions: (conditions, size, specimen, recording).
 Apply = Callable[[Conditions, float, np.random.Generator, np.random.Generator], None]
@@ -172,6 +175,11 @@ def _slack(conditions: Conditions, size: float, specimen: np.random.Generator,
 def _series_compliance(conditions: Conditions, size: float, specimen: np.random.Generator,
                        recording: np.random.Generator) -> None:
     conditions.compliance = size / 2500.0
+
+
+def _thermal_expansion(conditions: Conditions, size: float, specimen: np.random.Generator,
+                       recording: np.random.Generator) -> None:
+    conditions.expansion = EXPANSION * size
 
 
 def _unequal_muscles(conditions: Conditions, size: float, specimen: np.random.Generator,
@@ -341,6 +349,12 @@ LATER = {
                           'wires.', _cold_clamps),
 }
 
+# What only a bench tells; an arm has the wire of its bench.
+OF_WIRES = {
+    'thermal_expansion': Effect('The wire expands with its temperature.', _thermal_expansion,
+                                bench=True),
+}
+
 # Here stood a torn wire while no catalogue had it.
 BEFORE = 'unlisted_flexed_lead'
 TORN = {'wire_break': Effect('One of the wires breaks; the others carry its load.', _wire_break)}
@@ -352,14 +366,14 @@ def _in_order() -> dict[str, Effect]:
         if name == BEFORE:
             found.update(TORN)
         found[name] = Effect(kind.__doc__ or '', _disturb(kind), listed=False)
-    return {**found, **LATER}
+    return {**found, **LATER, **OF_WIRES}
 
 
 EFFECTS = _in_order()
 
 
 def hidden_effects() -> tuple[str, ...]:
-    """Return the names of the effects that the catalogue has, too."""
+    """Return the names of the effects that the catalogue has for an arm, too."""
     return (*LISTED, *LATER, *TORN)
 
 

@@ -39,6 +39,7 @@ class ParallelWires:
         self._largest = 0.0
         for wire in self.wires:
             wire.compliance = conditions.compliance
+            wire.expansion = conditions.expansion
         self.heat_and_cool()
 
     def heat_and_cool(self, temperature: float = ROOM, tension: float | None = None) -> None:

@@ -16,6 +16,7 @@ from typing import Any, cast, ClassVar
 import numpy as np
 
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.laboratory.heat import ROOM
 from hysteresis_ros.laboratory.solve import RootFinder
 
 # Largest tension considered [N]; far above what any bench or arm here asks for.
@@ -136,6 +137,8 @@ class Wire(abc.ABC):
         Length that the wire has beyond its elongation: dead length, creep [m].
     compliance : float
         Of crimps and cable in series with the wire [m/N].
+    expansion : float
+        Coefficient of thermal expansion of both phases [1/K].
     """
 
     def __init__(self, material: Material) -> None:
@@ -143,6 +146,7 @@ class Wire(abc.ABC):
         self.retained = 0.0
         self.excess = 0.0
         self.compliance = 0.0
+        self.expansion = 0.0
         self._section = material.section
         self._length = material.resting_length
         self._find = RootFinder(TYPICAL_COMPLIANCE, LENGTH_TOLERANCE)
@@ -194,11 +198,13 @@ class Wire(abc.ABC):
         tension : float
             Tension [N], at least 0.
         """
-        return self._elongation(self._peek_strain(temperature, tension / self._section), tension)
+        return self._elongation(
+            self._peek_strain(temperature, tension / self._section), temperature, tension)
 
     def commit(self, temperature: float, tension: float) -> float:
         """Bring the wire there, memory included, and return its elongation [m]."""
-        return self._elongation(self._commit_strain(temperature, tension / self._section), tension)
+        return self._elongation(
+            self._commit_strain(temperature, tension / self._section), temperature, tension)
 
     def tension(self, temperature: float, elongation: float, guess: float = 1.0) -> float:
         """
@@ -221,8 +227,10 @@ class Wire(abc.ABC):
         return self._find(lambda force: self.elongation(temperature, force) - elongation,
                           guess, 0.0, LARGEST_TENSION)
 
-    def _elongation(self, strain: float, tension: float) -> float:
-        return self._length * (strain - self._rest) + self.excess + self.compliance * tension
+    def _elongation(self, strain: float, temperature: float, tension: float) -> float:
+        expanded = self.expansion * (temperature - ROOM)
+        return (self._length * (strain + expanded - self._rest) + self.excess
+                + self.compliance * tension)
 
 
 def steps_between(before: float, after: float, largest: float) -> list[float]:
