@@ -92,6 +92,74 @@ def test_of_two_effects_that_stand_for_each_other_each_alone_competes(selection,
         assert selection.unstable['fatigue'].startswith('cannot be determined here: vague; it')
 
 
+def growth(selection, high):
+    """Return a fit whose strain grows with the load, and an effect whose growth may end beyond."""
+    fit = of_share(selection, ('stress_dependent_strain', 'slack'), 0.3, 0.3)
+    effect = catalogue()['stress_dependent_strain'](r=0.3, F0=2.0)
+    effect.intervals['F0'] = 1.2, high
+    return fit, [effect, fit.effects[1]]
+
+
+def test_growth_whose_end_no_row_shows_is_that_of_a_softer_martensite(selection, monkeypatch):
+    """In proportion to the load both are the same, and that one has a parameter less."""
+    straight = catalogue()['stress_dependent_strain']().parameters[1].bounds[1]
+    fit, effects = growth(selection, straight)
+    softer, worse = (of_share(selection, ('phase_modulus', 'slack'), share, 0.3)
+                     for share in (0.31, 0.4))
+
+    def taken(rival, high=straight, notes=(), unstable=()):
+        monkeypatch.setattr(selection.fitter, 'with_intervals',
+                            lambda one: growth(selection, high)[1] if one is fit else one.effects)
+        monkeypatch.setattr(selection, '_notes', lambda one: dict.fromkeys(notes, 'vague'))
+        monkeypatch.setattr(selection, 'found', fit)
+        monkeypatch.setattr(selection, 'tried', [fit, rival])
+        monkeypatch.setattr(selection, 'unstable', dict.fromkeys(unstable, 'not named again'))
+        selection._take_simpler()
+        return selection.found is rival
+    assert effects[0].in_limit() and taken(softer)
+    assert selection.unstable['stress_dependent_strain'].startswith(
+        'cannot be determined here: it may as well be phase_modulus; it')
+    # The rows show the end; or that one is worse, not determined either, or was left out.
+    assert not taken(softer, 0.99 * straight)
+    assert not taken(worse)
+    assert not taken(softer, notes=['phase_modulus'])
+    assert not taken(softer, unstable=['phase_modulus'])
+    # It is no reason either to leave that one out.
+    taken(softer)
+    monkeypatch.setattr(selection, '_determines', lambda one: True)
+    monkeypatch.setattr(selection, 'unstable', {})
+    monkeypatch.setattr(selection, 'sets', [fit, softer])
+    assert selection._best_without('phase_modulus') is selection.base
+    assert selection._best_without('slack') is selection.base
+    monkeypatch.setattr(selection.fitter, 'with_intervals', lambda one: one.effects)
+    assert selection._best_without('phase_modulus') is fit
+
+
+def test_only_a_growth_that_is_nearly_straight_may_be_something_else():
+    kind = catalogue()['stress_dependent_strain']
+    assert kind.limit == 'phase_modulus' and catalogue()['phase_modulus'].limit is None
+    for n in (1.0, 2.0, 4.0):
+        effect = kind(r=0.3, F0=2.0, n=n)
+        assert not effect.in_limit()
+        effect.intervals['F0'] = 1.0, effect.parameters[1].bounds[1]
+        assert effect.in_limit() == (n == 1.0)
+
+
+def test_a_simpler_set_that_was_not_tried_is_fitted(selection, monkeypatch):
+    found = selection.fitter.cross_validate(selection.fitter.fit(
+        [catalogue()['stress_dependent_strain'](
+            selection.problem.model.surroundings, r=0.5, F0=0.9)]))
+    monkeypatch.setattr(selection, 'found', found)
+    monkeypatch.setattr(selection, 'tried', [found])
+    monkeypatch.setattr(selection, 'sets', [found])
+    monkeypatch.setattr(selection, 'p_values', {})
+    fit = selection._with_instead('stress_dependent_strain', 'phase_modulus')
+    assert fit.names == ('phase_modulus',) and fit.held_out is not None
+    assert fit in selection.tried and fit in selection.sets
+    assert 0.0 <= selection.p_values[fit.names] <= 1.0
+    assert selection._with_instead('stress_dependent_strain', 'phase_modulus') is fit
+
+
 def test_a_load_predicted_nearly_as_well_is_no_argument_against_an_effect(selection, monkeypatch):
     for share, named in ((1.03, 1.0), (1.4, 0.0)):
         monkeypatch.setattr(selection, 'found', of_share(selection, ('slack',), share, 1.0))

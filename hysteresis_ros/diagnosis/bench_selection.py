@@ -24,7 +24,8 @@ from hysteresis_ros.diagnosis.bench_search import (
     all_help, BenchSearch, not_universal, says_more)
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.observable import observable
-from hysteresis_ros.effects import catalogue
+from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.effects import catalogue, Effect
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.bench_problem import BenchProblem
@@ -103,7 +104,7 @@ class BenchSelection:
             return
         self._choose()
         while (self._leave_out_chance() or self._leave_out_unstable()
-               or self._leave_out_undetermined()):
+               or self._leave_out_undetermined() or self._take_simpler()):
             pass
 
     def _choose(self) -> None:
@@ -206,6 +207,34 @@ class BenchSelection:
         self._leave_out(name, notes[name], without[name])
         return True
 
+    def _take_simpler(self) -> bool:
+        """Take a simpler effect for one that may as well be that, if it predicts loads as well."""
+        largest = (1.0 + self.settings.practical) * self.typical_error(self.found)
+        for name in {effect.limit for effect in self.found.effects if effect.limit}:
+            if name in (*self.found.names, *self.unstable):
+                continue
+            for effect in self._in_limit(self.found, name):
+                simpler = self._with_instead(effect.id, name)
+                if (not simpler.implausible() and name not in self._notes(simpler)
+                        and self.typical_error(simpler) <= largest):
+                    self._leave_out(effect.id, f'it may as well be {name}', simpler)
+                    return True
+        return False
+
+    def _with_instead(self, name: str, other: str) -> Fit:
+        """Return the set found with another effect in the place of one of its own."""
+        wanted = {other, *self.found.names} - {name}
+        known = next((fit for fit in self.tried if set(fit.names) == wanted), None)
+        if known is not None:
+            return known
+        kept = [effect for effect in self.found.effects if effect.id != name]
+        new = usual([catalogue()[other](self.problem.model.surroundings)], self.problem.kind)
+        fit = self.fitter.cross_validate(self.fitter.fit([*kept, *new]))
+        self.tried.append(fit)
+        self.sets.append(fit)
+        self.p_values[fit.names] = float(self._significance([fit], self.base)[0])
+        return fit
+
     def _notes(self, fit: Fit) -> dict[str, str]:
         """Return why the rows do not determine the size of an effect, of those of a fit."""
         if id(fit) not in self._known_notes:
@@ -235,7 +264,14 @@ class BenchSelection:
                    and not_universal(fit) <= not_universal(self.found)]
         return next((fit for fit in sorted(without, key=self.typical_error)
                      if self.typical_error(fit) < self.typical_error(self.base)
-                     and self._determines(fit)), self.base)
+                     and self._determines(fit) and not self._in_limit(fit, name)), self.base)
+
+    def _in_limit(self, fit: Fit, name: str) -> list[Effect]:
+        """Return the effects of a fit that may as well be another one, which is simpler."""
+        if all(effect.limit != name for effect in fit.effects):
+            return []
+        return [effect for effect in self.fitter.with_intervals(fit)
+                if effect.limit == name and effect.in_limit()]
 
     def _named_again(self, other: Fit) -> float:
         """Return the share of folds that the set found predicts no worse than another one."""

@@ -238,6 +238,8 @@ class Effect(abc.ABC):
     parameters: tuple[Parameter, ...] = ()
     # Effects whose own equation contains that of another one, which it then replaces.
     replaces: ClassVar[tuple[str, ...]] = ()
+    # The simpler effect that its equation comes to in a limit.
+    limit: ClassVar[str | None] = None
     # Kinds of measurement in which the effect can show.
     kinds: ClassVar[tuple[str, ...]] = ('arm',)
     # Whether only a recording with transients can show it.
@@ -312,6 +314,10 @@ class Effect(abc.ABC):
         """
         for name in self.memory:
             setattr(self, name, state[name])
+
+    def in_limit(self) -> bool:
+        """Whether its intervals reach the limit in which it is `limit`."""
+        return False
 
     def with_values(self, **values: float) -> 'Effect':
         """

@@ -109,6 +109,7 @@ class StressDependentStrain(MaterialEffect):
     confused_with = ('series_compliance',)
     kinds = ('arm', 'bench')
     universal = True
+    limit = 'phase_modulus'
     parameters = (
         Parameter('r', '1', 'share of the strain that is missing without load', 0.02, 1.0, 0.0,
                   (0.3, 0.8), limits=(0.0, 1.0), kinds=('bench',)),
@@ -140,6 +141,16 @@ class StressDependentStrain(MaterialEffect):
             return 0.0 * load
         on_bench, growth = self._shares(np.float64(surroundings.rest_load), surroundings)
         return 0.0 * load + float(growth / max(on_bench, 0.02)) * surroundings.least
+
+    def in_limit(self) -> bool:
+        """
+        Whether the interval of F0 reaches the straight line.
+
+        Orientation saturates. Growth in proportion to the load is that of a softer martensite.
+        """
+        largest = next(one for one in self.parameters if one.name == 'F0').bounds[1]
+        _, high = self.intervals.get('F0', (0.0, 0.0))
+        return self.n == 1.0 and high >= largest
 
     def _shares(self, load: Values, surroundings: Surroundings) -> tuple[Values, Values]:
         """Return the share of the strain under a load on the bench, and what the arm adds to it."""
