@@ -27,6 +27,7 @@ TRIALS = {'length_trials': range(4), 'force_trials': [0]}
 USUAL = ['stress_dependence', 'stress_dependent_strain', 'series_compliance']
 NOISE, PRACTICAL = 2e-5, 0.05
 LOADS, ROWS = (1.2, 3.1, 5.1, 7.0), 120
+CORNERS = (0.0, 6.0, 0.0, *np.tile([4.2, 2.8], 5), 6.0, *np.tile([1.8, 3.4], 5))
 
 
 @pytest.fixture(scope='module')
@@ -43,9 +44,8 @@ def usual(force):
     return add_effects(plain, length, force, USUAL, **TRIALS)[0]
 
 
-def made(model, share, rho=0.0, seed=0, noise=NOISE, loads=LOADS):
+def made(model, share, rho=0.0, seed=0, noise=NOISE, loads=LOADS, corners=CORNERS):
     """Return lengths of a wire of which a share follows its kinetics, with small loops repeated."""
-    corners = [0.0, 6.0, 0.0, *np.tile([4.2, 2.8], 5), 6.0, *np.tile([1.8, 3.4], 5)]
     drive = np.interp(np.linspace(0.0, len(corners) - 1.0, ROWS), np.arange(len(corners)), corners)
     columns = {'trial': np.repeat(np.arange(float(len(loads))), ROWS),
                'voltage': np.tile(drive, len(loads)), 'force': np.repeat(loads, ROWS)}
@@ -123,6 +123,16 @@ def test_no_bench_whose_loops_close_shows_them(usual, rho):
     for seed in range(8):
         length = made(usual, 0.0, rho, seed, 2e-4)
         assert sought(fitter_of(usual, length), usual.effects) is None
+
+
+def test_no_bench_without_minor_loops_shows_them(usual, monkeypatch):
+    """Under a load whose cold wire has not transformed altogether they may predict it better."""
+    once, turned = (made(usual, 0.8, corners=corners) for corners in (
+        (0.0, 6.0, 0.0), (0.0, 6.0, 0.0, 6.0)))
+    monkeypatch.setattr(BenchFitter, 'search', lambda *_: pytest.fail('sought'))
+    assert sought(fitter_of(usual, once), usual.effects) is None
+    with pytest.raises(pytest.fail.Exception, match='sought'):
+        sought(fitter_of(usual, turned), usual.effects)
 
 
 def test_they_are_sought_once_and_where_a_muscle_can_have_them(usual, monkeypatch):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.comparison.compare import compare
+from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.extend import extend
 from hysteresis_ros.identification.bench import identify
@@ -55,6 +56,22 @@ def test_the_load_that_a_plain_operator_does_not_know_is_found(data, alloy):
     values = {effect.id: effect.values for effect in extension.added}
     assert 5.0 <= values['stress_dependence']['C'] <= 15.0
     assert extension.test['rmse_after'] < 0.25 * extension.test['rmse_before']
+
+
+@pytest.mark.slow
+def test_an_alloy_expands_with_its_temperature(data):
+    """NiTiHf: between the stresses that are fitted half of the error was the expansion."""
+    training, held_out, _ = ALLOYS['nitihf']
+    table = read_measurement(data / 'sma_react' / 'nitihf_isobaric.csv')
+    train, test = table.select(training), table.select(held_out)
+    model, added = add_effects(identify(train, operator='preisach').model, train)
+    values = {effect.id: effect for effect in added}
+    assert set(values) == {'stress_dependence', 'stress_dependent_strain', 'phase_modulus',
+                           'thermal_expansion'}
+    # Of Ni-Ti alloys from 6.6 to 14 millionths per kelvin are known.
+    low, high = values['thermal_expansion'].intervals['alpha']
+    assert 5.0 < low < high < 20.0
+    assert percent(model, test, np.ptp(test.column('strain'))) < 1.0
 
 
 def test_a_piezo_stack_is_described_by_one_operator(data):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit
+from hysteresis_ros.diagnosis.bench_expansion import with_expansion
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_kinetics import shown_kinetics
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
@@ -26,6 +27,7 @@ from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.effects.kinetics import Kinetics
+from hysteresis_ros.effects.thermal_expansion import ThermalExpansion
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.bench import choose_trials, measure
 from hysteresis_ros.workers import one_blas_thread
@@ -128,6 +130,8 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     """Return the model with the effects found and usual but for some, and those effects."""
     known = _with_universal(
         model, [effect for effect in found if effect.id not in excluded], problem, excluded)
+    if ThermalExpansion.id not in excluded:
+        known = with_expansion(BenchFitter(problem.finer()), known, Settings().practical)
     if Kinetics.id not in excluded:
         shown = shown_kinetics(BenchFitter(problem.finer()), known, Settings().practical,
                                np.random.default_rng(0))

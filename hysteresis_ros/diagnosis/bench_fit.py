@@ -65,11 +65,28 @@ class Response:
         """Return the vector (k,) of least squares near a start."""
         if len(start) == 0:
             return start
+        mean, pull = self._known_beforehand(start)
         return minimise(
-            lambda vector: (self.predicted(vector) - self.problem.measured)[
-                self._fitted] / self._scale,
-            lambda vector: self.jacobian(vector)[self._fitted] / self._scale,
+            lambda vector: np.append((self.predicted(vector) - self.problem.measured)[
+                self._fitted] / self._scale, pull @ (vector - mean)),
+            lambda vector: np.vstack((self.jacobian(vector)[self._fitted] / self._scale, pull)),
             start, self.parameters.lower, self.parameters.upper, evaluations, tolerance)
+
+    def _known_beforehand(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """
+        Return mean (k,) and the rows (m, k) that pull those parameters there that need it.
+
+        Rows within a block are not independent: a block weighs as much as one standard deviation.
+        """
+        mean, spread = self.parameters.prior()
+        chosen = np.flatnonzero([one.one_sided for _, one in self.parameters.entries])
+        pull = np.zeros((len(chosen), len(mean)))
+        if len(chosen):
+            error = (self.predicted(start) - self.problem.measured)[self._fitted] / self._scale
+            blocks = len(np.unique(self.problem.block[self._fitted]))
+            pull[np.arange(len(chosen)), chosen] = np.sqrt(
+                error @ error / blocks) / spread[chosen]
+        return mean, pull
 
     def fit(self, vector: np.ndarray) -> Fit:
         """

@@ -18,10 +18,12 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
+from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.significance import typical_gain_interval
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.effects.kinetics import Kinetics
+from hysteresis_ros.measurements.turns import turns
 
 
 @dataclasses.dataclass
@@ -60,13 +62,14 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
     Returns
     -------
     BenchKinetics or None
-        None where the rows do not determine the share, or loads held out are not sure to be
-        predicted better by what matters.
+        None where there are no minor loops, the rows do not determine the share, or loads held
+        out are not sure to be predicted better by what matters.
     """
     problem = fitter.problem
     surroundings = problem.model.surroundings
     known = {effect.id for effect in (*fitter.fixed, *found)}
-    if Kinetics.id in known or not Kinetics.available(surroundings):
+    if (Kinetics.id in known or not Kinetics.available(surroundings)
+            or not _has_minor_loops(problem)):
         return None
     with np.errstate(all='ignore'):
         own = fitter
@@ -89,6 +92,19 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
         problem.fold, problem.noise, rng)
     # A comparison that NaN does not pass.
     return BenchKinetics([*fixed, *effects], before, after) if gain >= practical else None
+
+
+def _has_minor_loops(problem: BenchProblem) -> bool:
+    """
+    Whether the drive of some trial turns again after it has turned once.
+
+    Branches of the major loop are those of H2 whatever the kinetics. A swing within an interval of
+    the grid of H2 is noise.
+    """
+    drive = problem.signals['drive']
+    least = float(np.ptp(drive)) / problem.levels
+    return any(turns(drive[problem.trial == trial], least) > 1
+               for trial in np.unique(problem.trial))
 
 
 def _with_intervals(fitter: BenchFitter, fit: Fit) -> list[Effect]:

@@ -63,6 +63,9 @@ class Parameter:
         those of the paper's. They hold for any muscle if it is empty.
     with_form : str
         Name of the parameter of form without which this one does nothing; fitted only with it.
+    one_sided : bool
+        Whether rows of a bench bound it on one side only, because H2's weights can make up for a
+        value that is too large; the plausible range then counts as known beforehand.
     """
 
     name: str
@@ -80,6 +83,7 @@ class Parameter:
     form: bool = False
     scale: str = ''
     with_form: str = ''
+    one_sided: bool = False
 
     def of(self, surroundings: 'Surroundings | None') -> 'Parameter':
         """Return it with the unit, range and starts that suit a muscle; for none, as it is."""

@@ -19,7 +19,9 @@ class ThermalExpansion(MaterialEffect):
     The muscle gets longer with its temperature, in both phases and under any load.
 
     The weights of H2 have one sign: of a muscle that contracts when heated no relay lengthens it.
-    What expands the hot and the cold muscle makes the loop smaller at both ends instead.
+    What expands the hot and the cold muscle makes the loop smaller at both ends instead. Relays
+    without a loop contract the muscle evenly, too, and can undo more expansion than there is: the
+    rows of a bench tell the least that explains them.
     """
 
     id = 'thermal_expansion'
@@ -36,7 +38,8 @@ class ThermalExpansion(MaterialEffect):
     kinds = ('bench',)
     parameters = (
         Parameter('alpha', '% of l0', 'elongation at the largest drive of the bench',
-                  1e-4 * LEAST * HEATED[0], 1e-4 * LARGEST * HEATED[1], 0.0, (0.06,), log=True),)
+                  1e-4 * LEAST * HEATED[0], 1e-4 * LARGEST * HEATED[1], 0.0, (0.06,), log=True,
+                  one_sided=True),)
 
     @classmethod
     def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
@@ -44,7 +47,7 @@ class ThermalExpansion(MaterialEffect):
         if surroundings is None or surroundings.drive != 'temperature':
             return cls.parameters
         return (Parameter('alpha', '1e-6/K', 'coefficient of thermal expansion', LEAST, LARGEST,
-                          0.0, (10.0,), log=True),)
+                          0.0, (10.0,), log=True, one_sided=True),)
 
     def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,
               surroundings: Surroundings) -> tuple[np.ndarray, np.ndarray]:
