@@ -239,6 +239,36 @@ def test_the_discrepancy_is_larger_where_the_muscle_transforms(problem):
     assert found == pytest.approx((4e-4 * gain * relative) ** 2 + history.path ** 2)
 
 
+def test_an_error_of_the_thresholds_shows_where_the_response_follows_the_drive():
+    """Of all at once, so that an arm that stands still since a turn has that of the turn."""
+    metrics = with_relative(verification=(0.4, 0.4), left_out=(1.0, 1.0))
+    # Of a bench whose response follows by 0.5 mm/V^2, a length that is off by 0.4 mm.
+    metrics['length']['verification']['relative_rmse']['drive'] = 0.8
+    metrics['length']['verification']['drive_slope'] = 5e-4
+    model = bicep_model(metrics=metrics)
+    assert discrepancy.drive_error(model) == pytest.approx(0.8 / 5e-4)
+    metrics['length']['left_out']['relative_rmse']['drive'] = 0.0
+    metrics['length']['left_out']['drive_slope'] = 2e-3
+    assert discrepancy.drive_error(model) == pytest.approx(0.8 / 5e-4 / np.sqrt(2.0))
+    assert discrepancy.drive_error(bicep_model()) == 0.0
+    problem = problem_for(model, [runs(model)])
+    along = discrepancy.drive_sensitivity(problem, [])
+    squared = problem.signals['drive'] ** 2
+    shifted = runs(model)
+    voltage = shifted.column('voltage')
+    up, down = (model.predict(dataclasses.replace(shifted, columns={
+        **shifted.columns, 'voltage': np.sqrt(np.maximum(voltage ** 2 + change, 0.0))}))[
+            problem.chosen[0]] for change in (0.1, -0.1))
+    rows = squared > 0.2
+    assert along[rows] == pytest.approx(((up - down) / 0.2)[rows], rel=0.05, abs=2e-4)
+    gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
+    found = np.diag(discrepancy.discrepancy_along(
+        problem, [], problem.simulate([]), Settings()).matrix(courses=False))
+    own = gain * discrepancy.relative_errors(model, history.martensite)
+    thresholds = along * discrepancy.drive_error(model)
+    assert found == pytest.approx(4e-4 ** 2 * (own ** 2 + thresholds ** 2) + history.path ** 2)
+
+
 def test_martensite_along_the_way_is_that_of_the_second_stage(problem):
     history = load_history(problem, [])
     simulator, = problem.simulators

@@ -12,13 +12,14 @@ from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import length_error
 from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.identification.bench import drive_slope, identify
 from hysteresis_ros.laboratory.experiments import experiment_tables, write_experiment
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.measurements.metrics import relative_rmse
 from hysteresis_ros.measurements import Measurement, write_csv
 from hysteresis_ros.model import MuscleModel
 from hysteresis_ros.model.loads import uncovered_load
+from model_support import bicep_model
 import numpy as np
 import pytest
 
@@ -45,8 +46,8 @@ def test_the_error_of_loads_left_out_is_kept(two_loads, tmp_path):
     fit = found.length_fit
     fitted = length.where(length.column('trial') < 4)
     assert found.model.metrics['length']['left_out']['relative_rmse'] == pytest.approx(
-        relative_rmse(fit.held_out, fitted.column('length'), fitted.column('trial'))[
-            'relative_rmse'])
+        relative_rmse(fit.held_out, fitted.column('length'), fitted.column('trial'),
+                      drive_slope(found.model, fitted))['relative_rmse'])
     left_out = found.model.metrics['length']['left_out']['rmse']
     assert left_out == fit.validation[fit.strengths == fit.strength][0] > fit.rmse
     # Without trials that verify, it is what the bench's error is known from.
@@ -166,3 +167,17 @@ def test_lengths_that_are_no_elongations_are_refused_for_an_arm(change, words):
     with pytest.raises(ParameterError, match=words):
         api.identify(wrong, force, geometry=GEOMETRY)
     assert api.identify(wrong, force).model.geometry is None
+
+
+def test_a_row_follows_an_error_of_the_thresholds_as_the_last_turn_did():
+    """Where the drive has just turned nothing moves, and what is missing since stays so."""
+    model = bicep_model()
+    drive = np.array([1.0, 3.0, 4.0, 3.95, 3.9])
+    table = Measurement.from_columns({
+        'trial': np.zeros(5), 'voltage': drive, 'force': np.full(5, 4.0), 'length': np.zeros(5)})
+    slope = drive_slope(model, table)
+    assert slope[2] < 10.0 * slope[0] < 0.0
+    assert slope[3:] == pytest.approx(slope[2], rel=0.1)
+    near = [model.predict(Measurement.from_columns({
+        **table.columns, 'voltage': np.sqrt(drive ** 2 + change)})) for change in (0.05, -0.05)]
+    assert slope == pytest.approx((near[0] - near[1]) / 0.1, rel=0.1, abs=1e-6)

@@ -131,14 +131,47 @@ def test_the_error_at_the_ends_and_halfway_is_over_that_of_its_trial():
     one = relative_rmse(residual, response, np.zeros(3))['relative_rmse']
     assert one == pytest.approx({'ends': np.sqrt((square[0] + square[2]) / 2.0),
                                  'halfway': np.sqrt(square[1])})
-    # A quarter of the way up a row counts by 3/4 as halfway.
+    # A quarter of the way up, 3/4 of the mean square is that halfway.
     four = relative_rmse(np.array([1.0, 2.0, 2.0, 1.0]), np.array([0.0, 1.0, 3.0, 4.0]),
                          np.zeros(4))['relative_rmse']
-    assert four == pytest.approx({'ends': np.sqrt((2.0 + 0.5 * 4.0) / 2.5 / 2.5),
-                                  'halfway': np.sqrt(4.0 / 2.5)})
+    assert four == pytest.approx({'ends': np.sqrt(1.0 / 2.5),
+                                  'halfway': np.sqrt((4.0 - 0.25 * 1.0) / 0.75 / 2.5)})
     twice = relative_rmse(np.append(residual, -7.0 * residual), np.append(response, 3.0 * response),
                           np.repeat([0, 1], 3))['relative_rmse']
     assert twice == pytest.approx(one)
+
+
+def parts_of(sizes, seed=0, rows=4000):
+    """Return what errors of the ends, halfway and of the drive, of given sizes, are said to be."""
+    rng = np.random.default_rng(seed)
+    response, slope = rng.uniform(0.0, 1.0, rows), rng.exponential(2.0, rows)
+    share = 4.0 * response * (1.0 - response)
+    spread = np.sqrt(sizes[0] ** 2 * (1.0 - share) + sizes[1] ** 2 * share
+                     + (sizes[2] * slope) ** 2)
+    residual = spread * rng.standard_normal(rows)
+    found = relative_rmse(residual, response, np.repeat([3, 7], rows // 2), slope)
+    assert found['drive_slope'] == pytest.approx(np.sqrt(np.mean(slope ** 2)), rel=1e-9)
+    size = np.sqrt(np.mean(residual ** 2))
+    ends, between, drive = (size * found['relative_rmse'][name]
+                            for name in ('ends', 'halfway', 'drive'))
+    return ends, between, drive / found['drive_slope']
+
+
+@pytest.mark.parametrize('sizes', [(1.0, 2.0, 0.5), (0.2, 0.5, 1.0), (0.5, 0.5, 0.0)])
+def test_an_error_is_told_apart_into_that_of_the_ends_the_middle_and_the_drive(sizes):
+    found = np.mean([parts_of(sizes, seed) for seed in range(4)], axis=0)
+    assert found == pytest.approx(sizes, rel=0.15, abs=0.07)
+
+
+def test_a_response_that_no_drive_moves_says_nothing_of_the_drive():
+    residual, response = np.array([1.0, 5.0, 1.0]), np.array([2.0, 3.0, 4.0])
+    assert relative_rmse(residual, response, np.zeros(3), np.zeros(3)) == relative_rmse(
+        residual, response, np.zeros(3))
+    # One trial whose error is none does not count, and no row is where the middle alone acts.
+    both = relative_rmse(np.append(residual, np.zeros(3)), np.tile(response, 2),
+                         np.repeat([0, 1], 3), np.array([0.0, 1.0, 2.0, 9.0, 9.0, 9.0]))
+    one = relative_rmse(residual, response, np.zeros(3), np.array([0.0, 1.0, 2.0]))
+    assert both == one and one['drive_slope'] == pytest.approx(np.sqrt(5.0 / 3.0))
 
 
 def test_errors_alike_everywhere_are_one_and_trials_without_say_nothing():

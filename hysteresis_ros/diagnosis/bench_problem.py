@@ -23,7 +23,7 @@ from hysteresis_ros.diagnosis.bench_design import (
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.identification.bench import left_out
+from hysteresis_ros.identification.bench import drive_slope, left_out
 from hysteresis_ros.identification.fixed_point import fixed_point
 from hysteresis_ros.identification.grid import FOLLOWING
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
@@ -476,11 +476,12 @@ class BenchProblem(Problem):
             if other[0].held_out_rmse < (1.0 - WORTH) * fit.held_out_rmse:
                 fit, design = other
         stage = operator_with(design.nodes, fit.weights, fit.bias)
-        metrics = dict(self.model.metrics)
-        metrics['length'] = {**metrics.get('length', {}), **left_out(
-            fit, self.measured, self.trial, self.signals.get('load'))}
-        return dataclasses.replace(
-            self.model, effects=list(effects), length_stage=stage, metrics=metrics, replicates=[])
+        found = dataclasses.replace(
+            self.model, effects=list(effects), length_stage=stage, replicates=[])
+        slope = self.pick([drive_slope(found, one) for one in self.measurements])
+        found.metrics = {**found.metrics, 'length': {**found.metrics.get('length', {}), **left_out(
+            fit, self.measured, self.trial, self.signals.get('load'), slope)}}
+        return found
 
 
 def _operator(design: Design, z: np.ndarray) -> Preisach:

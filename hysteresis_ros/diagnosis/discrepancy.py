@@ -6,9 +6,11 @@ Discrepancy of the base model: how wrong it is by itself, as a covariance of an 
 It is known before the arm moves. With effects, their equations may be off as well.
 
 * The bench says how large the error of the length is under each load, on trials or loads that were
-  held out, and by how much larger it is halfway through the transformation than at its ends. On
-  the arm it shows as an error of the angle that is alike at neighbouring responses and at drives
-  between which the response does little, and differs between the directions of the drive.
+  held out, and of what it consists: an error of the length at the ends of the transformation,
+  another one halfway, and one of the thresholds, which goes with the slope of the response over the
+  drive squared. On the arm it shows as an error of the angle that is alike at neighbouring
+  responses and at drives between which the response does little, and differs between the directions
+  of the drive.
 * What the loads of the bench say, they say of all rows of an arm at once. A load that the bench
   lacks would change the model about as much as one that it has does when it is left out
   (`model.replicates`; Efron, The Jackknife, the Bootstrap and Other Resampling Plans, 1982).
@@ -35,11 +37,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.load_history import load_history
-from hysteresis_ros.effects import Effect, Inputs, MaterialEffect, Parameter, Surroundings
+from hysteresis_ros.effects import (
+    DriveEffect, Effect, Inputs, MaterialEffect, Parameter, Surroundings)
 from hysteresis_ros.effects.ambient import AmbientTemperature
+from hysteresis_ros.effects.base import Values
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.formation_memory import FormationMemory
 from hysteresis_ros.effects.kinetics import Kinetics
+from hysteresis_ros.identification.bench import SHIFT
 from hysteresis_ros.measurements.metrics import halfway
 from hysteresis_ros.measurements.way import unit, way_done
 
@@ -153,6 +158,19 @@ class Offset(MaterialEffect):
         return np.full(len(drive), self.size), np.ones(len(drive))
 
 
+class Shift(DriveEffect):
+    """A constant added to the drive squared, to see what an error of the thresholds does."""
+
+    id = 'shift'
+    stage = 'thermal'
+    lasting = True
+    parameters = (Parameter('size', 'V^2', 'what is added', 0.0, 1.0, 0.0, ()),)
+
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
+        """Return the drive squared with it."""
+        return signal + self.size
+
+
 def length_error(model: MuscleModel) -> float:
     """
     Return the root mean square error of the length [m] that the bench has shown.
@@ -215,9 +233,7 @@ def relative_errors(model: MuscleModel, martensite: np.ndarray) -> np.ndarray:
     """
     Return the error of the length at a share of martensite over that of all, as the bench says.
 
-    A threshold that is a little off shows where the muscle transforms, and hardly where it is cold
-    or hot; and most rows of a bench are. The mean square is laid out between the ends and halfway
-    by 4 xi (1 - xi).
+    The mean square is laid out between the ends and halfway by 4 xi (1 - xi).
 
     Parameters
     ----------
@@ -230,9 +246,7 @@ def relative_errors(model: MuscleModel, martensite: np.ndarray) -> np.ndarray:
     ndarray, shape (n,)
         All 1 where the model's metrics say nothing of it.
     """
-    metrics = model.metrics.get('length', {})
-    known = [metrics[part]['relative_rmse'] for part in ('verification', 'left_out')
-             if 'relative_rmse' in metrics.get(part, {})]
+    known = _relative(model)
     if not known:
         return np.ones(len(martensite))
     ends, between = (np.mean([one[name] ** 2 for one in known]) for name in ('ends', 'halfway'))
@@ -240,12 +254,50 @@ def relative_errors(model: MuscleModel, martensite: np.ndarray) -> np.ndarray:
     return np.sqrt((1.0 - share) * ends + share * between)
 
 
+def drive_error(model: MuscleModel) -> float:
+    """
+    Return the error of the thresholds for an error of the length, as the bench says.
+
+    A wire that transforms within a few volts misses a threshold where it is steep, and nothing
+    where it is cold or hot; and most rows of a bench are.
+
+    Returns
+    -------
+    float
+        Root mean square, drive squared per unit of the length; 0 where the model's metrics say
+        nothing of it.
+    """
+    known = [(one['drive'] / one['drive_slope']) ** 2 for one in _relative(model)
+             if 'drive' in one]
+    return math.sqrt(np.mean(known)) if known else 0.0
+
+
+def _relative(model: MuscleModel) -> list[dict[str, float]]:
+    """Return of what the errors of trials and loads that were held out consist."""
+    metrics = model.metrics.get('length', {})
+    return [{**metrics[part]['relative_rmse'],
+             **{name: metrics[part][name] for name in ('drive_slope',) if name in metrics[part]}}
+            for part in ('verification', 'left_out') if 'relative_rmse' in metrics.get(part, {})]
+
+
 def sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """Return how the angle follows an error of the length [rad/m], shape (n,)."""
-    step = 0.01 * problem.model.surroundings.span
+    return _slope(Offset(size=0.01 * problem.model.surroundings.span), problem, effects)
+
+
+def drive_sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+    """Return how the angle follows one of all thresholds [rad per drive squared], shape (n,)."""
+    return _slope(Shift(size=SHIFT * problem.model.surroundings.full_drive_squared), problem,
+                  effects)
+
+
+def _slope(effect: Effect, problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+    """Return how the response follows the size of one more effect, shape (n,)."""
+    size = effect.values['size']
     up, down = problem.simulate_many(
-        [[*effects, Offset(size=step)], [*effects, Offset(size=-step)]])
-    return (up - down) / (2.0 * step)
+        [[*effects, effect], [*effects, effect.with_values(size=-size)]])
+    slope: np.ndarray = (up - down) / (2.0 * size)
+    return slope
 
 
 def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted: np.ndarray,
@@ -280,9 +332,11 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     direction = np.ones(len(predicted))
     if 'direction' in problem.signals:
         direction = np.where(problem.signals['direction'] > 0.0, 1.0, -1.0)
-    bench = (gain * length_errors(problem.model, history.load)
-             * relative_errors(problem.model, history.martensite)
-             / math.sqrt(1.0 + DIRECTIONAL ** 2))
+    length = length_errors(problem.model, history.load) / math.sqrt(1.0 + DIRECTIONAL ** 2)
+    bench = length * gain * relative_errors(problem.model, history.martensite)
+    thresholds = drive_error(problem.model)
+    if thresholds:
+        bench = np.hypot(bench, length * thresholds * drive_sensitivity(problem, effects))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
     parts = np.column_stack([bench, DIRECTIONAL * direction * bench, history.path])
     common = left_out_changes(problem, effects)

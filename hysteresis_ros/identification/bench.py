@@ -27,6 +27,7 @@ from hysteresis_ros.identification.least_squares import WeightFit
 from hysteresis_ros.identification.operators import fit_operator
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import MuscleModel
+from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.result import Brief, Result
 from hysteresis_ros.workers import one_blas_thread
 
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
 LEVELS = (10, 20)
 # Of one operator; its least squares take memory with the fourth power, 0.2 GB for as many.
 MOST_LEVELS = 100
+# By which share of the largest drive squared thresholds are moved to see what that does: a tenth of
+# the interval of a grid.
+SHIFT = 0.003
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
@@ -247,7 +251,8 @@ def identify(length: Measurement | None = None, force: Measurement | None = None
         fitted = length.where(_fitted_rows(length, length_trials, length_rows))
         load = fitted.column(fitted.load) if fitted.load else None
         model.metrics['length'].update(left_out(
-            length_fit, fitted.column(fitted.response), fitted.column('trial'), load))
+            length_fit, fitted.column(fitted.response), fitted.column('trial'), load,
+            drive_slope(model, length)[_fitted_rows(length, length_trials, length_rows)]))
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit, force, length)
 
@@ -393,6 +398,7 @@ def measure(model: MuscleModel, force: Measurement | None, force_trials: Sequenc
         span = float(np.ptp(measured))
         predicted = {method: model.predict(measurement, method)
                      for method in ('preisach', 'linear')}
+        slope = drive_slope(model, measurement) if name == 'length' else np.zeros(0)
         entry: dict[str, dict[str, Any]] = {}
         for part, chosen in (('identification', rows), ('verification', ~rows)):
             if np.any(chosen):
@@ -404,7 +410,8 @@ def measure(model: MuscleModel, force: Measurement | None, force_trials: Sequenc
                 if name == 'length':
                     residual = (predicted['preisach'] - measured)[chosen]
                     trial = measurement.column('trial')[chosen]
-                    entry[part].update(relative_rmse(residual, measured[chosen], trial))
+                    entry[part].update(relative_rmse(
+                        residual, measured[chosen], trial, slope[chosen]))
                     if measurement.load:
                         load = measurement.column(measurement.load)[chosen]
                         entry[part].update(rmse_by_load(residual, load, trial))
@@ -412,8 +419,32 @@ def measure(model: MuscleModel, force: Measurement | None, force_trials: Sequenc
     return metrics
 
 
+def drive_slope(model: MuscleModel, measurement: Measurement) -> np.ndarray:
+    """
+    Return how each row of a bench table follows an error of all thresholds, shape (rows,).
+
+    Parameters
+    ----------
+    model : MuscleModel
+    measurement : Measurement
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+        Change of the response per drive squared (per drive where that is no voltage or current) by
+        which that of the whole trial is larger. It is that of the last turn where nothing moves.
+    """
+    chain = Chain([], model.surroundings)
+    step = SHIFT * model.surroundings.full_drive_squared
+    squared = chain.to_drive_squared(measurement.column(model.drive))
+    up, down = (model.predict(dataclasses.replace(measurement, columns={
+        **measurement.columns, model.drive: chain.to_drive(squared + change)}))
+        for change in (step, -step))
+    return (up - down) / (2.0 * step)
+
+
 def left_out(fit: WeightFit, response: np.ndarray, groups: np.ndarray,
-             load: np.ndarray | None = None) -> dict[str, Any]:
+             load: np.ndarray | None = None, slope: np.ndarray | None = None) -> dict[str, Any]:
     """
     Return the metric of trials, mostly of other loads, that were left out of the fit.
 
@@ -425,8 +456,8 @@ def left_out(fit: WeightFit, response: np.ndarray, groups: np.ndarray,
         Of the rows fitted, as measured.
     groups : ndarray, shape (n,)
         Trial of each row fitted.
-    load : ndarray, shape (n,), optional
-        Their load.
+    load, slope : ndarray, shape (n,), optional
+        Their load, and their `drive_slope`.
 
     Returns
     -------
@@ -437,7 +468,7 @@ def left_out(fit: WeightFit, response: np.ndarray, groups: np.ndarray,
         return {}
     by_load = {} if load is None else rmse_by_load(fit.held_out, load, groups)
     return {'left_out': {'rmse': fit.held_out_rmse, **by_load,
-                         **relative_rmse(fit.held_out, response, groups)}}
+                         **relative_rmse(fit.held_out, response, groups, slope)}}
 
 
 def _provenance(force: Measurement | None, force_trials: Sequence[float] | None,

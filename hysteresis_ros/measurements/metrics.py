@@ -4,7 +4,7 @@
 
 from collections.abc import Sequence
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from hysteresis_ros.measurements import Measurement, settled_rows
 import numpy as np
@@ -12,6 +12,8 @@ import numpy as np
 FEWEST_REPEATED_ROWS = 5
 # Loads that differ by less than this share of the largest are one.
 SAME_LOAD = 0.02
+# Passes of the rule by which the parts of an error are found, and the least variance, of one.
+PASSES, SMALLEST = 200, 1e-12
 
 
 class Errors(NamedTuple):
@@ -97,37 +99,64 @@ def rmse_by_load(residual: np.ndarray, load: np.ndarray, trial: np.ndarray
             'rmse_by_load': [float(np.sqrt(np.mean(residual[rows] ** 2))) for rows in chosen]}
 
 
-def relative_rmse(residual: np.ndarray, response: np.ndarray, trial: np.ndarray
-                  ) -> dict[str, dict[str, float]]:
+def relative_rmse(residual: np.ndarray, response: np.ndarray, trial: np.ndarray,
+                  slope: np.ndarray | None = None) -> dict[str, Any]:
     """
-    Return the error at the ends of the transformation and halfway, over that of all rows.
+    Return of what an error consists, over that of all rows.
 
-    Each row counts as halfway by 4 p (1 - p), with p the place of its response between the ends of
-    its trial, and the more so as an end.
+    Its mean square in a row is laid out as
+
+        e^2 (1 - h) + m^2 h + d^2 s^2 / s0^2,    h = 4 p (1 - p),
+
+    with p the place of the response between the ends of its trial, s its slope and s0 the root mean
+    square of that: an error of the ends, one of the middle, and one of the drive. They are those of
+    normal errors that are most likely, found by the multiplicative rule that never lowers the
+    likelihood (Fevotte, Bertin and Durrieu, Neural Computation 21 (2009) 793).
 
     Parameters
     ----------
     residual, response, trial : ndarray, shape (rows,)
+    slope : ndarray, shape (rows,), optional
+        How the response follows the drive squared.
 
     Returns
     -------
     dict
-        'relative_rmse' with 'ends' and 'halfway'; nothing where no trial has response and error.
+        'relative_rmse' with 'ends', 'halfway' and, with a slope, 'drive', e, m and d; then
+        'drive_slope', s0. Nothing where no trial has response and error.
 
     """
-    squares, shares = [], []
+    squares, shares, chosen = [], [], np.zeros(len(residual), dtype=bool)
     for one in np.unique(trial):
         rows = trial == one
         mean, span = float(np.mean(residual[rows] ** 2)), float(np.ptp(response[rows]))
         if mean > 0.0 and span > 0.0:
             squares.append(residual[rows] ** 2 / mean)
             shares.append(halfway((response[rows] - np.min(response[rows])) / span))
+            chosen |= rows
     if not squares:
         return {}
-    square, share = np.concatenate(squares), np.concatenate(shares)
-    found = {name: float(np.sqrt(square @ weight / max(float(np.sum(weight)), 1e-12)))
-             for name, weight in (('ends', 1.0 - share), ('halfway', share))}
-    return {'relative_rmse': found}
+    share = np.concatenate(shares)
+    parts = {'ends': 1.0 - share, 'halfway': share}
+    found: dict[str, Any] = {}
+    if slope is not None and np.any(slope[chosen]):
+        # Rows are in the order of their trials.
+        along = np.concatenate([slope[trial == one] for one in np.unique(trial[chosen])])
+        found['drive_slope'] = float(np.sqrt(np.mean(along ** 2)))
+        parts['drive'] = (along / found['drive_slope']) ** 2
+    variances = _most_likely(np.concatenate(squares), np.column_stack(list(parts.values())))
+    found['relative_rmse'] = dict(zip(parts, np.sqrt(variances).tolist()))
+    return found
+
+
+def _most_likely(squares: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Return the variances (k,) whose parts (n, k) are those of normal errors with squares (n,)."""
+    variances = np.full(parts.shape[1], float(np.mean(squares)))
+    for _ in range(PASSES):
+        total = np.maximum(parts @ variances, SMALLEST)
+        variances = variances * (parts.T @ (squares / total ** 2)) / np.maximum(
+            parts.T @ (1.0 / total), SMALLEST)
+    return variances
 
 
 def halfway(place: np.ndarray) -> np.ndarray:

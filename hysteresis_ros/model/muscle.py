@@ -73,8 +73,8 @@ class MuscleModel:
         H2 and effects as identified without one of the bench's loads each.
     metrics, provenance : dict
         Errors of the identification (of lengths also `rmse_by_load` [m] at `loads` [N], and
-        `relative_rmse` at the ends of the transformation and halfway), and where the model came
-        from.
+        `relative_rmse` at the ends of the transformation, halfway and of the thresholds), and
+        where the model came from.
     """
 
     kind: str
