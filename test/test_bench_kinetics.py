@@ -128,7 +128,7 @@ def test_no_bench_whose_loops_close_shows_them(usual, rho):
 def test_no_bench_without_minor_loops_shows_them(usual, monkeypatch):
     """Under a load whose cold wire has not transformed altogether they may predict it better."""
     once, turned = (made(usual, 0.8, corners=corners) for corners in (
-        (0.0, 6.0, 0.0), (0.0, 6.0, 0.0, 6.0)))
+        (0.0, 6.0, 0.0), (0.0, 6.0, 0.0, 2.0)))
     monkeypatch.setattr(BenchFitter, 'search', lambda *_: pytest.fail('sought'))
     assert sought(fitter_of(usual, once), usual.effects) is None
     with pytest.raises(pytest.fail.Exception, match='sought'):

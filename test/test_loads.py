@@ -70,6 +70,7 @@ def test_effects_change_the_error_of_loads_left_out(two_loads):
                               length_trials=range(4), force_trials=[0])
     before, after = (one.metrics['length']['left_out']['rmse'] for one in (base, extended))
     assert after < before
+    assert extended.metrics['length']['left_out']['relative_rmse']['drive'] > 0.0
     assert extended.metrics['length']['verification']['rmse'] > 0.0
 
 

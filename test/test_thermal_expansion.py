@@ -3,6 +3,7 @@
 """A muscle expands with its temperature: the law, its inverse, and where it makes sense."""
 
 from hysteresis_ros.effects import catalogue, Inputs
+from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.hidden_physics import EFFECTS, EXPANSION, SPREAD, apply_effects
 from hysteresis_ros.laboratory.parallel_wires import ParallelWires
@@ -75,6 +76,13 @@ def test_ranges_are_those_of_metals():
     assert not warmed.plausible(1.0) and not warmed.plausible(40.0)
     assert all(heated.plausible(value) for value in (0.02, 0.3))
     assert not heated.plausible(0.005) and not heated.plausible(0.5)
+
+
+def test_an_arm_whose_conditions_change_has_other_wires_from_then_on():
+    arm = Arm(Conditions())
+    arm.change_at(0.0, lambda: setattr(arm.conditions, 'expansion', 1e-5))
+    arm.advance(0.1, 0.0)
+    assert [wire.expansion for wire in arm.muscle.wires] == [1e-5]
 
 
 def test_a_wire_of_the_laboratory_expands_on_bench_and_arm():

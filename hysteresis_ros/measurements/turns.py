@@ -26,8 +26,4 @@ def turns(values: np.ndarray, least: float) -> int:
         elif direction >= 0 and high - value > least:
             count += direction > 0
             direction, low = -1, value
-        if direction > 0:
-            low = high
-        elif direction < 0:
-            high = low
     return count
