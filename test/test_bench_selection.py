@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
+from hysteresis_ros.diagnosis import bench_effects
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_fit import Response
 from hysteresis_ros.diagnosis.bench_selection import BenchSelection
@@ -133,6 +134,28 @@ def test_growth_whose_end_no_row_shows_is_that_of_a_softer_martensite(selection,
     assert selection._best_without('slack') is selection.base
     monkeypatch.setattr(selection.fitter, 'with_intervals', lambda one: one.effects)
     assert selection._best_without('phase_modulus') is fit
+
+
+def test_what_identification_adds_is_said_in_simpler_terms_too(selection, monkeypatch):
+    """What every loaded muscle has may show only with it that a growth has no end."""
+    fitter, kind = selection.fitter, catalogue()['stress_dependent_strain']
+    known = [kind(selection.problem.model.surroundings, r=0.5, F0=0.9)]
+    straight, own = known[0].parameters[1].bounds[1], type(fitter).with_intervals
+
+    def names(high, worse=1.0, excluded=()):
+        def intervals(fit):
+            effects = own(fitter, fit)
+            if fit.names == ('stress_dependent_strain',):
+                effects[0].intervals['F0'] = 0.5, high
+            return effects
+        monkeypatch.setattr(fitter, 'with_intervals', intervals)
+        monkeypatch.setattr(bench_effects, '_typical_error', lambda _, fit: (
+            1.0 if fit.names == ('stress_dependent_strain',) else worse))
+        return [effect.id for effect in bench_effects._in_simpler_terms(fitter, known, excluded)]
+    assert names(straight) == ['phase_modulus']
+    assert names(straight, 1.04) == ['phase_modulus']
+    assert names(straight, 1.06) == names(0.9 * straight) == ['stress_dependent_strain']
+    assert names(straight, excluded=['phase_modulus']) == ['stress_dependent_strain']
 
 
 def test_only_a_growth_that_is_nearly_straight_may_be_something_else():

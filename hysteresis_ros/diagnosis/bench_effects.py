@@ -25,6 +25,7 @@ from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.diagnosis.significance import typical_error
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.effects.thermal_expansion import ThermalExpansion
@@ -130,6 +131,7 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     """Return the model with the effects found and usual but for some, and those effects."""
     known = _with_universal(
         model, [effect for effect in found if effect.id not in excluded], problem, excluded)
+    known = _in_simpler_terms(BenchFitter(problem.finer()), known, excluded)
     if ThermalExpansion.id not in excluded:
         known = with_expansion(BenchFitter(problem.finer()), known, Settings().practical)
     if Kinetics.id not in excluded:
@@ -139,6 +141,31 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     if not known:
         return model, []
     return extended_model(model, [one.id for one in known], problem.measurements, known)
+
+
+def _in_simpler_terms(fitter: BenchFitter, known: Sequence[Effect], excluded: Collection[str]
+                      ) -> list[Effect]:
+    """Return the effects known, with simpler ones for those that may as well be these."""
+    fit = fitter.fit(known)
+    for effect in fitter.with_intervals(fit):
+        name = effect.limit
+        if name is None or name in (*fit.names, *excluded) or not effect.in_limit():
+            continue
+        new, = usual([catalogue()[name](fitter.problem.model.surroundings)], 'bench')
+        simpler = fitter.fit([*(one for one in fit.effects if one.id != effect.id), new])
+        found = fitter.with_intervals(simpler)
+        if not (simpler.implausible() or _undetermined([one for one in found if one.id == name])
+                or _typical_error(fitter, simpler)
+                > (1.0 + Settings().practical) * _typical_error(fitter, fit)):
+            return found
+    return list(known)
+
+
+def _typical_error(fitter: BenchFitter, fit: Fit) -> float:
+    """Return the typical error of loads held out; see `significance.typical_error`."""
+    problem = fitter.problem
+    return float(typical_error(
+        problem.squares(fitter.cross_validate(fit).held_out), problem.small_error))
 
 
 def _undetermined(effects: Sequence[Effect]) -> list[Effect]:
