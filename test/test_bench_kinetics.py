@@ -131,6 +131,9 @@ def test_no_bench_without_minor_loops_shows_them(usual, monkeypatch):
         (0.0, 6.0, 0.0), (0.0, 6.0, 0.0, 2.0)))
     monkeypatch.setattr(BenchFitter, 'search', lambda *_: pytest.fail('sought'))
     assert sought(fitter_of(usual, once), usual.effects) is None
+    still = fitter_of(usual, turned)
+    still.problem.signals = {'load': still.problem.signals['load']}
+    assert sought(still, usual.effects) is None
     with pytest.raises(pytest.fail.Exception, match='sought'):
         sought(fitter_of(usual, turned), usual.effects)
 

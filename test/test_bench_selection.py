@@ -156,6 +156,8 @@ def test_what_identification_adds_is_said_in_simpler_terms_too(selection, monkey
     assert names(straight, 1.04) == ['phase_modulus']
     assert names(straight, 1.06) == names(0.9 * straight) == ['stress_dependent_strain']
     assert names(straight, excluded=['phase_modulus']) == ['stress_dependent_strain']
+    monkeypatch.setattr(bench_effects, '_undetermined', list)
+    assert names(straight) == ['stress_dependent_strain']
 
 
 def test_only_a_growth_that_is_nearly_straight_may_be_something_else():

@@ -101,7 +101,8 @@ def _has_minor_loops(problem: BenchProblem) -> bool:
     Branches of the major loop are those of H2 whatever the kinetics. A swing within an interval of
     the grid of H2 is noise.
     """
-    drive = problem.signals['drive']
+    # A drive that stands still is no signal.
+    drive = problem.signals.get('drive', np.zeros(len(problem.measured)))
     least = float(np.ptp(drive)) / problem.levels
     return any(turns(drive[problem.trial == trial], least) > 1
                for trial in np.unique(problem.trial))
