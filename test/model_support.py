@@ -19,7 +19,7 @@ GEOMETRY = BicepGeometry(
 # An effect of each kind with values in its range, as it would show in an arm run.
 STRENGTHS = {
     'supply_sag': {'Rs': 0.4}, 'measured_supply': {'nominal': 11.0},
-    'pwm_dead_zone': {'Vd': 0.4}, 'resistance_change': {'eta': 0.1},
+    'pwm_dead_zone': {'Vd': 0.4}, 'supply_limit': {'cut': 0.8}, 'resistance_change': {'eta': 0.1},
     'airflow': {'beta': 1.2}, 'thermal_lag': {'time_constant': 3.0},
     'heating_cooling_asymmetry': {'time_constant': 3.0, 'ratio': 1.5},
     'heat_loss': {'time_constant': 4.0, 'growth': 0.6},

@@ -339,6 +339,14 @@ def test_the_resistance_is_that_of_the_martensite_whatever_else_lengthens_the_mu
     assert [miss for *_, miss in found] == pytest.approx([0.0] * 4, abs=1e-3)
 
 
+def test_what_the_supply_cannot_give_is_said_and_not_taken_for_given():
+    model = bicep_model()
+    full = model.controller().setpoint(-0.060, 6.0)
+    limited = dataclasses.replace(model, effects=[effect_of(model, 'supply_limit', cut=3.5)])
+    setpoint = limited.controller().setpoint(full.expected, 6.0)
+    assert setpoint.saturated and setpoint.error > 0.001
+
+
 @pytest.mark.parametrize('names', [(), ('r_phase',), ('unequal_muscles',), ('supply_sag',),
                                    ('resistance_change',)])
 @pytest.mark.parametrize('length, voltage', [(-0.06, 5.0), (0.04, 1.0)])

@@ -23,6 +23,7 @@ from model_support import arm_run, bicep_model, effect_of, STRENGTHS, wandering_
 EXPECTED = {
     'supply_sag': ('electrical', 'V', 'at the wire', {'airflow'}),
     'pwm_dead_zone': ('electrical', 'low V', 'fine steps of the voltage from 0', {'ambient_drift'}),
+    'supply_limit': ('electrical', 'high V', 'at the wire', {'end_stop', 'supply_sag'}),
     'measured_supply': ('electrical', 'recorded supply', 'log the supply',
                         {'supply_sag', 'ambient_drift'}),
     'resistance_change': ('electrical', 'middle of the loop', 'current', {'stress_dependence'}),
@@ -74,7 +75,7 @@ EXPECTED = {
     'geometry_error': ('mechanism', 'smooth in theta', 'calliper',
                        {'series_compliance', 'encoder_offset'}),
     'frame_tilt': ('mechanism', 'cos theta', 'spirit level', {'payload_error', 'encoder_offset'}),
-    'end_stop': ('mechanism', 'one end of theta', 'into the stop', {'slack'}),
+    'end_stop': ('mechanism', 'one end of theta', 'into the stop', {'slack', 'supply_limit'}),
     'encoder_offset': ('sensor', 'constant', 'hard stop', {'geometry_error'}),
     'encoder_eccentricity': ('sensor', 'an offset and a scale', 'without its muscles',
                              {'encoder_offset', 'geometry_error'}),
@@ -85,6 +86,7 @@ EXPECTED = {
 # Effect, parameter: unit and plausible range for a 0.2 mm wire on this arm.
 RANGES = {
     ('supply_sag', 'Rs'): ('Ohm', 0.01, 2.0), ('pwm_dead_zone', 'Vd'): ('V', 0.05, 1.5),
+    ('supply_limit', 'cut'): ('V', 0.05, 4.0),
     ('measured_supply', 'nominal'): ('V', 3.0, 60.0),
     ('thermal_lag', 'time_constant'): ('s', 0.03, 150.0),
     ('valve_lag', 'filling'): ('s', 0.03, 150.0), ('valve_lag', 'venting'): ('s', 0.03, 150.0),

@@ -20,6 +20,7 @@ STATELESS = {
     'supply_sag': ({'Rs': 2.0}, 5.0, 5.0 * 8.0 / 10.0),
     'measured_supply': ({'nominal': 12.0}, 4.0, 4.0 * 10.5 / 12.0),
     'pwm_dead_zone': ({'Vd': 1.0}, 3.0, 2.0 * 6.0 / 5.0),
+    'supply_limit': ({'cut': 1.0}, 4.5, 4.5),
     'resistance_change': ({'eta': 0.2}, 4.0, math.sqrt(16.0 / (1.0 + 0.2 * 0.3))),
     'ambient_temperature': ({'gain': 0.4, 'reference': 24.0}, 9.0, 9.0 + 0.4 * 7.0),
     'ambient_drift': ({'offset': 1.0, 'rate': 0.5, 'curvature': -0.25}, 9.0,
@@ -51,6 +52,8 @@ def test_inverse_undoes_the_forward_map(drive, phase, name):
     forward = float(made.forward(drive, inputs, WIRE))
     if name == 'pwm_dead_zone' and drive <= 1.0:
         assert (forward, made.inverse(forward, inputs, WIRE)) == (0.0, 0.0)
+    elif name == 'supply_limit' and drive > 5.0:
+        assert forward == made.inverse(forward, inputs, WIRE) == 5.0
     else:
         assert made.inverse(forward, inputs, WIRE) == pytest.approx(drive, abs=1e-11)
 
@@ -66,6 +69,15 @@ def test_less_than_nothing_stays_out_of_reach_behind_a_dead_zone():
     """A warmer room than that of the bench may ask for it; zero would be a lie."""
     made = effect('pwm_dead_zone', Vd=1.0)
     assert made.inverse(-2.0, ROOM, WIRE) < 0.0 == made.inverse(0.0, ROOM, WIRE)
+
+
+def test_what_is_beyond_a_limit_is_out_of_reach():
+    made = effect('supply_limit', cut=1.0)
+    rows = made.forward(np.array([-1.0, 0.0, 4.999, 5.0, 5.001, 7.0]), ROOM, WIRE)
+    np.testing.assert_array_equal(rows, [-1.0, 0.0, 4.999, 5.0, 5.0, 5.0])
+    assert made.inverse(5.001, ROOM, WIRE) > 6.0
+    neutral = effect('supply_limit')
+    assert float(neutral.forward(7.0, ROOM, WIRE)) == neutral.inverse(7.0, ROOM, WIRE) == 7.0
 
 
 @pytest.mark.parametrize('whole, arrives', [(0.0, 2.4), (1.0, 3.0)])

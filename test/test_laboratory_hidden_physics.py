@@ -24,7 +24,7 @@ CATALOGUE = (
     'creep fatigue slack series_compliance unequal_muscles coulomb_friction viscous_friction '
     'inertia payload_error clamp_mass geometry_error frame_tilt end_stop encoder_offset backlash '
     'latency cable_friction encoder_eccentricity measured_supply heat_loss wire_break '
-    'overload formation_memory cold_clamps').split()
+    'overload formation_memory cold_clamps supply_limit').split()
 MIDDLE = 4.1
 
 
@@ -95,6 +95,14 @@ def test_dead_zone():
     assert conditions.drive_squared(1.0, 0.0) == 0.0
     assert conditions.drive_squared(6.0, 0.0) == pytest.approx(36.0)
     assert conditions.drive_squared(3.5, 0.0) == pytest.approx(9.0)
+
+
+def test_limited_current():
+    """As much heat as is asked for below the limit; above it, more in the phase that resists."""
+    conditions = Conditions(largest_current=0.5, resistance_growth=0.25)
+    assert conditions.drive_squared(4.0, 0.0) == pytest.approx(16.0)
+    assert conditions.drive_squared(6.0, 0.0) == pytest.approx(16.0)
+    assert conditions.drive_squared(6.0, 1.0) == pytest.approx(20.0)
 
 
 def test_resistance_depends_on_the_phase():

@@ -151,6 +151,13 @@ def test_pulses_that_drop_out_and_pass_whole_above_are_a_dead_zone(monkeypatch):
     assert found.effects[0].Vd == pytest.approx(3.6, rel=0.1)
 
 
+def test_a_limited_current_is_a_limit_of_the_supply():
+    """In a settled arm that is nearly an end stop, but for minor loops on cooling."""
+    found = found_in({'supply_limit': 1.0}, 5, protocol='arm-steps', trials=(0, 1))
+    assert found.verdict == 'missing' and 'supply_limit' in named(found)
+    assert found.rmse_after < 0.4 * found.rmse_before
+
+
 class Saturating(float):
     """A shift [K/Pa] that grows less and less with the stress that it is multiplied by."""
 

@@ -117,6 +117,38 @@ class PwmDeadZone(ElectricalEffect):
         return full / max(full - self.Vd, 1e-3 * full)
 
 
+class SupplyLimit(ElectricalEffect):
+    """
+    A supply, driver or fuse that gives no more than a limit below the largest voltage of the bench.
+
+    Beyond it the muscle stays as hot as it is, and cools down from there: it goes through minor
+    loops where an arm that meets an `end_stop` still goes through the major one. Nothing gives back
+    what is beyond the limit; a controller says that such angles are out of reach.
+    """
+
+    id = 'supply_limit'
+    sentence = 'Beyond a limit the supply gives no more, whatever is set.'
+    equation = 'Ve = min(V, Vmax - cut), Vmax the largest of the bench'
+    source = 'current limit of a supply, largest duty of a PWM stage'
+    shows_in = 'high V: the hot end is not reached'
+    experiment = 'measure the voltage at the wire itself while the setpoint rises to the largest'
+    confused_with = ('end_stop', 'supply_sag')
+    parameters = (
+        Parameter('cut', 'V', 'what the limit is below the largest drive of the bench', 0.05, 4.0,
+                  0.0, (0.5, 1.0, 1.5, 2.0, 2.5, 3.0), log=True, scale='drive'),)
+
+    def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
+        """Cut the upper end off."""
+        return np.minimum(signal, self._limit(surroundings)) if self.cut else signal
+
+    def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
+        """Leave what is below the limit; what is beyond it stays out of reach."""
+        return signal if signal <= self._limit(surroundings) else signal + self.cut
+
+    def _limit(self, surroundings: Surroundings) -> float:
+        return math.sqrt(surroundings.full_drive_squared) - self.cut
+
+
 class ResistanceChange(ElectricalEffect):
     """Austenite and martensite conduct differently."""
 

@@ -196,7 +196,7 @@ class EndStop(MechanismEffect):
     source = 'unilateral spring'
     shows_in = 'one end of theta'
     experiment = 'drive the arm slowly into the stop'
-    confused_with = ('slack',)
+    confused_with = ('slack', 'supply_limit')
     invertible = False
     parameters = (
         Parameter('stop', 'rad', 'angle of the stop', 0.0, math.pi, -1.0,

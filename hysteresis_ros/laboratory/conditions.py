@@ -110,6 +110,8 @@ class Conditions:
         Of board and leads, in series with each wire [Ohm].
     dead_voltage : float
         Setpoint below which the board gives nothing [V].
+    largest_current : float
+        Current that the board limits each wire to [A].
     resistance_growth : float
         Relative resistance that the martensite has above the austenite.
     creep : float
@@ -161,6 +163,7 @@ class Conditions:
     supply: Supply = Supply()
     lead_resistance: float = 0.0
     dead_voltage: float = 0.0
+    largest_current: float = math.inf
     resistance_growth: float = 0.0
     creep: float = 0.0
     creep_time: float = 3.0
@@ -207,4 +210,5 @@ class Conditions:
         voltage = (voltage - self.dead_voltage) * FULL_VOLTAGE / (FULL_VOLTAGE - self.dead_voltage)
         resistance = RESISTANCE * (1.0 + self.resistance_growth * martensite)
         voltage *= resistance / (resistance + self.lead_resistance)
+        voltage = min(voltage, self.largest_current * resistance)
         return voltage * voltage * RESISTANCE / resistance

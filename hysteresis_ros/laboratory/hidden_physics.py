@@ -17,7 +17,7 @@ import numpy as np
 
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.laboratory.cable import Cable
-from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.conditions import Conditions, FULL_VOLTAGE, RESISTANCE
 from hysteresis_ros.laboratory.encoder_disc import EncoderDisc
 from hysteresis_ros.laboratory.heat import SPECIFIC_HEAT
 from hysteresis_ros.laboratory.still_air import StillAir
@@ -80,6 +80,12 @@ def _measured_supply(conditions: Conditions, size: float, specimen: np.random.Ge
 def _pwm_dead_zone(conditions: Conditions, size: float, specimen: np.random.Generator,
                    recording: np.random.Generator) -> None:
     conditions.dead_voltage = 1.0 * size
+
+
+def _supply_limit(conditions: Conditions, size: float, specimen: np.random.Generator,
+                  recording: np.random.Generator) -> None:
+    # Wires are hot from 4.5 to 5.5 V on, so that a limit shows below that.
+    conditions.largest_current = (FULL_VOLTAGE - 0.88 - 0.37 * size) / RESISTANCE
 
 
 def _resistance_change(conditions: Conditions, size: float, specimen: np.random.Generator,
@@ -347,6 +353,7 @@ LATER = {
                                _formation_memory, bench=True),
     'cold_clamps': Effect("Heavy clamps keep the ends of the arm's wires cold; the bench has long "
                           'wires.', _cold_clamps),
+    'supply_limit': Effect('The board limits the current of each wire.', _supply_limit),
 }
 
 # What only a bench tells; an arm has the wire of its bench.
