@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.errors import IdentificationError
-from hysteresis_ros.identification.bench import choose_trials, identify
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.identification.trials import choose_trials
 from hysteresis_ros.laboratory.experiments import bench_tables
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.operators import (

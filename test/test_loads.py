@@ -12,7 +12,8 @@ from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import length_error
 from hysteresis_ros.errors import ParameterError
-from hysteresis_ros.identification.bench import drive_slope, identify
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.identification.bench_metrics import drive_slope
 from hysteresis_ros.laboratory.experiments import experiment_tables, write_experiment
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.measurements.metrics import relative_rmse

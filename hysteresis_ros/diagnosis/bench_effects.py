@@ -25,12 +25,12 @@ from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
-from hysteresis_ros.diagnosis.significance import typical_error
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.effects.thermal_expansion import ThermalExpansion
 from hysteresis_ros.errors import IdentificationError
-from hysteresis_ros.identification.bench import choose_trials, measure
+from hysteresis_ros.identification.bench_metrics import measure
+from hysteresis_ros.identification.trials import choose_trials
 from hysteresis_ros.workers import one_blas_thread
 
 if TYPE_CHECKING:
@@ -146,6 +146,9 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
 def _in_simpler_terms(fitter: BenchFitter, known: Sequence[Effect], excluded: Collection[str]
                       ) -> list[Effect]:
     """Return the effects known, with simpler ones for those that may as well be these."""
+    def held_out(one: Fit) -> float:
+        return fitter.problem.typical_error(fitter.cross_validate(one).held_out)
+
     fit = fitter.fit(known)
     for effect in fitter.with_intervals(fit):
         name = effect.limit
@@ -155,17 +158,10 @@ def _in_simpler_terms(fitter: BenchFitter, known: Sequence[Effect], excluded: Co
         simpler = fitter.fit([*(one for one in fit.effects if one.id != effect.id), new])
         found = fitter.with_intervals(simpler)
         if not (simpler.implausible() or _undetermined([one for one in found if one.id == name])
-                or _typical_error(fitter, simpler)
-                > (1.0 + Settings().practical) * _typical_error(fitter, fit)):
+                or held_out(simpler)
+                > (1.0 + Settings().practical) * held_out(fit)):
             return found
     return list(known)
-
-
-def _typical_error(fitter: BenchFitter, fit: Fit) -> float:
-    """Return the typical error of loads held out; see `significance.typical_error`."""
-    problem = fitter.problem
-    return float(typical_error(
-        problem.squares(fitter.cross_validate(fit).held_out), problem.small_error))
 
 
 def _undetermined(effects: Sequence[Effect]) -> list[Effect]:

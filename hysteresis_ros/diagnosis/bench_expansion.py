@@ -16,7 +16,7 @@ import numpy as np
 
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.parameters import usual
-from hysteresis_ros.diagnosis.significance import schwarz_log_odds, typical_error
+from hysteresis_ros.diagnosis.significance import schwarz_log_odds
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.effects.thermal_expansion import ThermalExpansion
 
@@ -64,18 +64,13 @@ def with_expansion(fitter: BenchFitter, known: Sequence[Effect], practical: floa
 
 def _proves(problem: BenchProblem, before: Fit, after: Fit) -> bool:
     """Whether the rows fitted prefer one parameter more, with as many of them as blocks."""
-    without, with_it = (_typical(problem, fit.predicted, problem.noise) for fit in (before, after))
+    without, with_it = (problem.typical_error(fit.predicted, problem.noise)
+                        for fit in (before, after))
     return schwarz_log_odds(without, with_it, len(np.unique(problem.block)), 1) > 0.0
 
 
 def _harms(fitter: BenchFitter, before: Fit, after: Fit, practical: float) -> bool:
     """Whether loads held out are predicted worse by more than one parameter does by chance."""
-    problem = fitter.problem
-    without, with_it = (
-        _typical(problem, fitter.cross_validate(fit).held_out, problem.small_error)
-        for fit in (before, after))
+    without, with_it = (fitter.problem.typical_error(fitter.cross_validate(fit).held_out)
+                        for fit in (before, after))
     return with_it > (1.0 + practical) * without
-
-
-def _typical(problem: BenchProblem, response: np.ndarray, small: float) -> float:
-    return float(typical_error(problem.squares(response), small))

@@ -13,24 +13,24 @@ from collections.abc import Sequence
 import copy
 import dataclasses
 import functools
-from typing import Any, Literal, TYPE_CHECKING, TypeVar
+from typing import Literal, TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
-from hysteresis_ros.diagnosis.bench_design import (
-    Course, Design, Excitation, operator_with, Feedback, weight_sizes)
+from hysteresis_ros.diagnosis.bench_courses import BenchCourses
+from hysteresis_ros.diagnosis.bench_design import Design, Feedback, operator_with, weight_sizes
 from hysteresis_ros.diagnosis.problem import Problem
+from hysteresis_ros.diagnosis.significance import typical_error
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
-from hysteresis_ros.identification.bench import drive_slope, left_out
+from hysteresis_ros.identification.bench_metrics import drive_slope, left_out
 from hysteresis_ros.identification.fixed_point import fixed_point
 from hysteresis_ros.identification.grid import FOLLOWING
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
 from hysteresis_ros.identification.nonnegative import extrapolated, part_of
 from hysteresis_ros.identification.projection import ProjectedWeights
 from hysteresis_ros.identification.smoothness import smoothness
-from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.kinetic_stage import kinetic_stage, with_kinetics
 from hysteresis_ros.operators import Preisach
@@ -40,10 +40,6 @@ if TYPE_CHECKING:
     from hysteresis_ros.identification.weight_fit import WeightFit
     from hysteresis_ros.measurements import Measurement
     from hysteresis_ros.model import MuscleModel
-    from hysteresis_ros.model.first_stage import FirstStage
-    from hysteresis_ros.operators import HysteresisOperator
-
-Entry = TypeVar('Entry')
 
 # Strength of the weights' regularisation at which sets of effects are compared: only so much that
 # the solution is unique. More of it bends the effects' own parameters.
@@ -51,8 +47,6 @@ SEARCH_STRENGTH = 3e-9
 # The same for weights that predict rows held out: more of it widens a steep loop, which under a
 # load that was not fitted counts as the error of the effects.
 HELD_OUT_STRENGTH = 1e-9
-# Courses that are remembered, those of the latest effects.
-MOST_COURSES = 20
 # How often weights and their feedback are fitted to each other.
 PASSES = 2
 # The same at most for weights and kinetics, which are fitted to each other until what these give
@@ -97,21 +91,17 @@ class BenchProblem(Problem):
                                    f'model has a {stage.kind} one; identify it with --operator '
                                    'two-stage or preisach')
         self.levels = self._levels_of_model = len(stage.nodes) - 1
-        self._trials = [trial for simulator in self.simulators for trial in simulator.trials]
-        counts = np.array([len(trial.drive) for trial in self._trials])
-        # Before its first row each trial has the cold one, with that row's load.
-        self._ends = np.cumsum(counts + 1)
-        rows = np.arange(counts.sum())
-        self._felt = np.insert(rows, np.cumsum(counts) - counts, np.cumsum(counts) - counts)
-        self._load = np.concatenate([trial.load for trial in self._trials])
-        begins = np.cumsum([0] + [simulator.measurement.rows for simulator in self.simulators])
-        self._judged = np.concatenate(
-            [begin + chosen for begin, chosen in zip(begins, self.chosen)])
-        self._wanted = np.zeros(self._ends[-1], dtype=bool)
-        self._wanted[self._judged + np.repeat(np.arange(1, len(counts) + 1), counts)[
-            self._judged]] = True
         self._surroundings = model.surroundings
         self._transforms = model.surroundings.drive != 'pressure'
+        trials = [trial for simulator in self.simulators for trial in simulator.trials]
+        begins = np.cumsum([0] + [simulator.measurement.rows for simulator in self.simulators])
+        self._courses = BenchCourses(
+            model, trials,
+            np.concatenate([begin + chosen for begin, chosen in zip(begins, self.chosen)]),
+            self.measured, self.trial, FOLLOWING if self._transforms else 0.0)
+        loads = np.array([np.mean(trial.load) for trial in trials])
+        # Which load each trial has, shape (trials,); those that count as the same are equal.
+        self._load_of_trial = np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
         self._strength = SEARCH_STRENGTH
         self._forget()
 
@@ -119,8 +109,7 @@ class BenchProblem(Problem):
         """Begin without anything that was computed before."""
         self._holding_out: BenchProblem | None = None
         self._passive: dict[bytes | None, np.ndarray] = {}
-        self._courses: dict[tuple, Course] = {}
-        self._excitations: dict[tuple, Excitation] = {}
+        self._courses = self._courses.forgotten()
         self._phases_of: tuple | None = None
         self._known_phases: list[np.ndarray] = []
         self._known_kinetics: np.ndarray | None = None
@@ -137,7 +126,7 @@ class BenchProblem(Problem):
         """Return the same, from whose work this one does not learn; what is known, it shares."""
         other = copy.copy(self)
         other._passive = dict(self._passive)
-        other._courses, other._excitations = dict(self._courses), dict(self._excitations)
+        other._courses = self._courses.apart()
         if self._holding_out is not None:
             other._holding_out = self._holding_out.apart()
         return other
@@ -181,82 +170,30 @@ class BenchProblem(Problem):
             (self.measured - response) ** 2, np.ones(len(response))))
         return squares[rows > 0] / rows[rows > 0]
 
+    def typical_error(self, response: np.ndarray, least: float | None = None) -> float:
+        """
+        Return the geometric mean over the folds of the RMSE of a response (n,).
+
+        Errors of a fold below `least`, by default `small_error`, count as none; see
+        `significance.typical_error`.
+        """
+        return float(typical_error(
+            self.squares(response), self.small_error if least is None else least))
+
     @property
     def left_out_together(self) -> np.ndarray:
         """Groups of rows, shape (n,), by the load, or by the trial where all loads are the same."""
         loads = self._load_of_trial
         return loads[self.trial] if len(np.unique(loads)) > 1 else self.trial
 
-    @functools.cached_property
-    def _load_of_trial(self) -> np.ndarray:
-        """Which load each trial has, shape (trials,); those that count as the same are equal."""
-        loads = np.array([np.mean(trial.load) for trial in self._trials])
-        return np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
-
     def _design(self, effects: Sequence[Effect], levels: int | None = None,
                 train: np.ndarray | None = None, feedback: Feedback | None = None,
                 columns: np.ndarray | None = None) -> Design:
-        course = self._course(effects, feedback or self._feedback(effects, train))
+        course = self._courses.of(effects, feedback or self._feedback(effects, train))
         levels = levels or self.levels
-        scale, known = (column[self._judged] for column in (course.scales, course.known))
+        scale, known = self._courses.judged(course)
         return Design(course.excitation.shares(levels, scale, columns), known,
                       course.excitation.nodes(levels), course.excitation.smoothness(levels))
-
-    def _course(self, effects: Sequence[Effect], feedback: Feedback | None) -> Course:
-        key = tuple((effect.id, *effect.values.values()) for effect in effects)
-        if feedback is not None or key not in self._courses:
-            course = self._new_course(Chain(effects, self._surroundings), feedback)
-            if feedback is not None:
-                return course
-            # Folds that are held out in turn begin at the same effects.
-            _remember(self._courses, key, course)
-        return self._courses[key]
-
-    def _new_course(self, chain: Chain, feedback: Feedback | None) -> Course:
-        load, cold = self._load, chain.to_drive_squared(self.model.cold_drive)
-        driven: list[Any] = []
-        drifts: list[tuple[np.ndarray, np.ndarray]] = []
-        for number, trial in enumerate(self._trials):
-            inputs = trial.inputs
-            if feedback is not None and feedback.phases is not None:
-                inputs = inputs._replace(phase=feedback.phases[number])
-            squared = chain.drive_squared(trial.drive, inputs)
-            driven += [[cold], squared]
-            if chain.drifts:
-                drifts.append(chain.drift(trial.drive, squared, inputs))
-        offset, factor = np.concatenate(drifts, axis=1) if drifts else (0.0, 1.0)
-        scales, known = chain.scale(load) * factor + 0.0 * load, chain.stretch(load) + offset
-        if feedback is not None and feedback.kinetics is not None:
-            known = known + chain.kinetics * scales * feedback.kinetics
-        return Course(self._excitation(chain, np.concatenate(driven)), scales, known)
-
-    def _excitation(self, chain: Chain, squared: np.ndarray) -> Excitation:
-        """Return what H2 is given for the drive squared of all trials, shape (rows + trials,)."""
-        inside = chain.load_inside(self._load)
-        width = chain.loop_width(self._load)
-        key = (squared.tobytes(), inside.tobytes(), width.tobytes(),
-               chain.load_per_drive_squared())
-        if key not in self._excitations:
-            first = self.model.first_stage(chain)
-            x = self._first(first, squared)
-            if first.loaded:
-                x -= inside[self._felt]
-            given = self.model.sign * x
-            if first.loaded and chain.plays:
-                given = follow(given, width[self._felt], self._ends)
-            _remember(self._excitations, key, Excitation(
-                given, self._ends, self._wanted, self.measured, self.trial,
-                FOLLOWING if self._transforms else 0.0))
-        return self._excitations[key]
-
-    def _first(self, first: FirstStage, squared: np.ndarray) -> np.ndarray:
-        """Return x for the drive squared of all trials, each from the cold state."""
-        x, begin = np.empty(len(squared)), 0
-        for end in self._ends:
-            first.reset()
-            x[begin:end] = first.simulate(squared[begin:end])
-            begin = end
-        return x
 
     def _feedback(self, effects: Sequence[Effect], train: np.ndarray | None) -> Feedback | None:
         """Return what the best weights do that they depend on; None where it is nothing."""
@@ -275,7 +212,8 @@ class BenchProblem(Problem):
             return self._made_by_kinetics(effects, _operator(design, z), feedback)
 
         # What neighbouring parameters gave, or neighbouring rows, is near.
-        begin = np.zeros(len(self._load)) if self._known_kinetics is None else self._known_kinetics
+        begin = (np.zeros(len(self._courses.load)) if self._known_kinetics is None
+                 else self._known_kinetics)
         self._known_kinetics = fixed_point(
             made, begin, SETTLED * float(np.std(self.measured)), MOST_PASSES)
         return self._known_kinetics
@@ -284,20 +222,10 @@ class BenchProblem(Problem):
                           ) -> np.ndarray:
         """Return what kinetics of all of the wire add to the output of an H2, shape (rows,)."""
         whole = kinetic_stage(self.model, Chain(effects, self._surroundings), stage, 1.0)
-        kinetic, plain = (np.concatenate(self._outputs(effects, one, feedback))
+        course = self._courses.of(effects, feedback)
+        kinetic, plain = (np.concatenate(self._courses.outputs(course, one))
                           for one in (whole, stage))
         return kinetic - plain
-
-    def _outputs(self, effects: Sequence[Effect], stage: HysteresisOperator,
-                 feedback: Feedback | None) -> list[np.ndarray]:
-        """Return what an H2 gives in every row of each trial."""
-        found = []
-        inputs = self._course(effects, feedback).excitation.inputs
-        for part in np.split(inputs, self._ends[:-1]):
-            stage.reset()
-            stage.step(part[0])
-            found.append(stage.simulate(part[1:]))
-        return found
 
     def _phases(self, effects: Sequence[Effect], train: np.ndarray | None) -> list[np.ndarray]:
         """
@@ -322,7 +250,8 @@ class BenchProblem(Problem):
         """Return the martensite share that an H2 shows in every row of each trial."""
         model = dataclasses.replace(self.model, length_stage=stage)
         whole = with_kinetics(self.model, Chain(effects, self._surroundings), stage)
-        return [model.martensite(output) for output in self._outputs(effects, whole, feedback)]
+        course = self._courses.of(effects, feedback)
+        return [model.martensite(output) for output in self._courses.outputs(course, whole)]
 
     def _feedback_with(self, effects: Sequence[Effect], stage: Preisach, feedback: Feedback
                        ) -> Feedback:
@@ -487,10 +416,3 @@ class BenchProblem(Problem):
 def _operator(design: Design, z: np.ndarray) -> Preisach:
     """Return H2 with weights (K + 1,) times the sizes of their cells, its bias aside."""
     return operator_with(design.nodes, z[:-1] / weight_sizes(design.nodes), 0.0)
-
-
-def _remember(found: dict[tuple, Entry], key: tuple, value: Entry) -> None:
-    """Add an entry to a dict of the latest ones."""
-    found[key] = value
-    if len(found) > MOST_COURSES:
-        del found[next(iter(found))]

@@ -290,7 +290,7 @@ class BenchSelection:
         Else the least load, for which the others are extrapolated, would decide alone. Differences
         below `least` count as none; by default below what matters.
         """
-        return self._typical(fit.held_out, self.problem.small_error if least is None else least)
+        return self.problem.typical_error(fit.held_out, least)
 
     def typical_rmse(self, fit: Fit) -> float:
         """
@@ -308,10 +308,6 @@ class BenchSelection:
         return significance.typical_gain_interval(
             before, after, problem.block, problem.fold, problem.small_error, self.rng)
 
-    def _typical(self, response: np.ndarray, least: float) -> float:
-        """Return the typical error of a response (n,), differences below `least` aside."""
-        return float(significance.typical_error(self.problem.squares(response), least))
-
     def _log_odds(self, fit: Fit, base: Fit) -> float:
         """Return the log posterior odds of a fit against another one; see `probabilities`."""
         count = len(np.unique(self.problem.block))
@@ -325,7 +321,8 @@ class BenchSelection:
         By Schwarz's criterion, with as many independent rows as there are blocks.
         """
         count = len(np.unique(self.problem.block))
-        before, after = (self._typical(one.predicted, self.problem.noise) for one in (base, fit))
+        before, after = (self.problem.typical_error(one.predicted, self.problem.noise)
+                         for one in (base, fit))
         return self._prior_log_odds(fit, base) + significance.schwarz_log_odds(
             before, after, count, self._parameters(fit) - self._parameters(base))
 

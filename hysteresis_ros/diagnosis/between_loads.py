@@ -52,14 +52,14 @@ def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], practical
     """
     base = fitter.cross_validate(fitter.fit([]))
     largest = (1.0 - practical) * _error_between(fitter, base)
-    largest_fitted = (1.0 + practical) * _error_fitted(fitter, base)
+    largest_fitted = (1.0 + practical) * fitter.problem.typical_error(base.predicted)
 
     def judged(some: Sequence[Effect]) -> tuple[float, list[Effect]]:
         own = fitter.apart()
         with np.errstate(all='ignore'):
             fit = own.fit(some)
             if (not np.all(np.isfinite(fit.predicted)) or fit.implausible()
-                    or _error_fitted(own, fit) > largest_fitted):
+                    or own.problem.typical_error(fit.predicted) > largest_fitted):
                 return np.inf, []
             found = own.with_intervals(fit)
             if any(not_determined(one, own.problem.kind) for one in found):
@@ -72,12 +72,6 @@ def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], practical
             for some in itertools.combinations(simple, count)]
     error, found = min(map_in_forks(judged, sets, fitter.problem.jobs), key=lambda one: one[0])
     return found if error <= largest else []
-
-
-def _error_fitted(fitter: BenchFitter, fit: Fit) -> float:
-    """Return the typical error of the rows fitted."""
-    problem = fitter.problem
-    return float(typical_error(problem.squares(fit.predicted), problem.small_error))
 
 
 def _error_between(fitter: BenchFitter, fit: Fit) -> float:

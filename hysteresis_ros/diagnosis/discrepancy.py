@@ -44,7 +44,7 @@ from hysteresis_ros.effects.base import Values
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.formation_memory import FormationMemory
 from hysteresis_ros.effects.kinetics import Kinetics
-from hysteresis_ros.identification.bench import SHIFT
+from hysteresis_ros.identification.bench_metrics import SHIFT
 from hysteresis_ros.measurements.metrics import halfway
 from hysteresis_ros.measurements.way import unit, way_done
 

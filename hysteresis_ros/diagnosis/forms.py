@@ -13,7 +13,6 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.determined import not_determined
@@ -60,8 +59,8 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
         fit = trial.cross_validate(min(fits, key=lambda one: trial.error(one.predicted)))
         # To the error of all rows the least load contributes most, as the others are extrapolated
         # to it; to the typical one, by which sets are compared, all contribute alike.
-        return np.array([trial.error(fit.held_out), significance.typical_error(
-            trial.problem.squares(fit.held_out), trial.problem.small_error)]), fit
+        return np.array([trial.error(fit.held_out),
+                         trial.problem.typical_error(fit.held_out)]), fit
 
     def better(other: tuple[np.ndarray, Fit], than: tuple[np.ndarray, Fit]) -> bool:
         # As of sets: where rows held out tell two forms apart by less than what matters, the rows

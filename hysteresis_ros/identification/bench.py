@@ -18,16 +18,16 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros import __version__
-from hysteresis_ros.measurements.metrics import errors, relative_rmse, rmse_by_load
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.errors import IdentificationError, ParameterError
 from hysteresis_ros.identification.baselines import fit_linear
+from hysteresis_ros.identification.bench_metrics import drive_slope, left_out, measure
 from hysteresis_ros.identification.first_stage import first_stage_from_lengths
 from hysteresis_ros.identification.least_squares import WeightFit
 from hysteresis_ros.identification.operators import fit_operator
+from hysteresis_ros.identification.trials import choose_trials, fitted_rows
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import MuscleModel
-from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.result import Brief, Result
 from hysteresis_ros.workers import one_blas_thread
 
@@ -39,9 +39,6 @@ if TYPE_CHECKING:
 LEVELS = (10, 20)
 # Of one operator; its least squares take memory with the fourth power, 0.2 GB for as many.
 MOST_LEVELS = 100
-# By which share of the largest drive squared thresholds are moved to see what that does: a tenth of
-# the interval of a grid.
-SHIFT = 0.003
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')
 
 
@@ -143,27 +140,6 @@ class Recipe:
                             anchor=anchor if self.anchored else None, fitted=fitted, **options)
 
 
-def choose_trials(measurement: Measurement, trials: Sequence | None, name: str) -> np.ndarray:
-    """
-    Say which rows belong to the trials named; all of them by default.
-
-    Raises
-    ------
-    IdentificationError
-        If a trial is not in the table.
-    """
-    column = measurement.column('trial')
-    if trials is None:
-        return np.ones(len(column), dtype=bool)
-    absent = sorted(set(trials) - set(np.unique(column).tolist()))
-    if absent:
-        there = ', '.join(f'{trial:g}' for trial in np.unique(column))
-        raise IdentificationError(
-            f'{measurement.source}: no {name} trial {", ".join(f"{t:g}" for t in absent)}; there '
-            f'are {there}')
-    return np.isin(column, list(trials))
-
-
 @one_blas_thread()
 def identify(length: Measurement | None = None, force: Measurement | None = None, *,
              force_trials: Sequence[float] | None = None,
@@ -244,15 +220,17 @@ def identify(length: Measurement | None = None, force: Measurement | None = None
                 model.force_stage = _first_stage_from_lengths(model, length, rows, levels[0])
             length_fit = _length_stage(model, length, rows, levels[1], recipe, length_rows)
     model.linear = fit_linear(
-        length and length.where(_fitted_rows(length, length_trials, length_rows)),
+        length and length.where(fitted_rows(length, length_trials, length_rows)),
         force and force.where(choose_trials(force, force_trials, 'force')))
-    model.metrics = measure(model, force, force_trials, length, length_trials)
+    slope = None if length is None else drive_slope(model, length)
+    model.metrics = measure(model, force, force_trials, length, length_trials, slope)
     if length is not None and length_fit is not None:
-        fitted = length.where(_fitted_rows(length, length_trials, length_rows))
+        rows = fitted_rows(length, length_trials, length_rows)
+        fitted = length.where(rows)
         load = fitted.column(fitted.load) if fitted.load else None
         model.metrics['length'].update(left_out(
             length_fit, fitted.column(fitted.response), fitted.column('trial'), load,
-            drive_slope(model, length)[_fitted_rows(length, length_trials, length_rows)]))
+            None if slope is None else slope[rows]))
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit, force, length)
 
@@ -326,13 +304,6 @@ def _second_inputs(model: MuscleModel, length: Measurement, rows: np.ndarray) ->
     return parts
 
 
-def _fitted_rows(length: Measurement, trials: Sequence[float] | None,
-                 some: np.ndarray | None) -> np.ndarray:
-    """Return the rows of the length table that are fitted, ndarray of bool."""
-    rows = choose_trials(length, trials, 'length')
-    return rows if some is None else rows & some
-
-
 def _length_stage(model: MuscleModel, length: Measurement, rows: np.ndarray, levels: int,
                   recipe: Recipe, some: np.ndarray | None) -> WeightFit | None:
     """Fit H2 to length against F - H1[V]."""
@@ -367,108 +338,6 @@ def _first_stage_from_lengths(model: MuscleModel, length: Measurement, rows: np.
     return first_stage_from_lengths(
         columns(model.drive), columns(model.load_name or 'force'), columns(model.response),
         model.cold_drive, levels, squared=model.drive in ELECTRIC_DRIVES)
-
-
-def measure(model: MuscleModel, force: Measurement | None, force_trials: Sequence[float] | None,
-            length: Measurement | None, length_trials: Sequence[float] | None) -> dict[str, Any]:
-    """
-    Return the model's metrics: errors on fitted and on other trials, of both methods.
-
-    Parameters
-    ----------
-    model : MuscleModel
-        With effects or without.
-    force, length : Measurement or None
-        The bench tables.
-    force_trials, length_trials : sequence of numbers or None
-        Trials that were fitted.
-
-    Returns
-    -------
-    dict
-        By 'force' and 'length', as far as there is a table.
-    """
-    metrics = {}
-    for name, measurement, trials in (('force', force, force_trials),
-                                      ('length', length, length_trials)):
-        if measurement is None:
-            continue
-        rows = choose_trials(measurement, trials, name)
-        measured = measurement.column(measurement.response)
-        span = float(np.ptp(measured))
-        predicted = {method: model.predict(measurement, method)
-                     for method in ('preisach', 'linear')}
-        slope = drive_slope(model, measurement) if name == 'length' else np.zeros(0)
-        entry: dict[str, dict[str, Any]] = {}
-        for part, chosen in (('identification', rows), ('verification', ~rows)):
-            if np.any(chosen):
-                entry[part] = {
-                    label: errors((predicted[method] - measured)[chosen], span).to_dict()
-                    for label, method in (('model', 'preisach'), ('linear', 'linear'))}
-                entry[part]['rmse'] = entry[part]['model']['rmse']
-                entry[part]['rows'] = int(np.count_nonzero(chosen))
-                if name == 'length':
-                    residual = (predicted['preisach'] - measured)[chosen]
-                    trial = measurement.column('trial')[chosen]
-                    entry[part].update(relative_rmse(
-                        residual, measured[chosen], trial, slope[chosen]))
-                    if measurement.load:
-                        load = measurement.column(measurement.load)[chosen]
-                        entry[part].update(rmse_by_load(residual, load, trial))
-        metrics[name] = entry
-    return metrics
-
-
-def drive_slope(model: MuscleModel, measurement: Measurement) -> np.ndarray:
-    """
-    Return how each row of a bench table follows an error of all thresholds, shape (rows,).
-
-    Parameters
-    ----------
-    model : MuscleModel
-    measurement : Measurement
-
-    Returns
-    -------
-    ndarray, shape (rows,)
-        Change of the response per drive squared (per drive where that is no voltage or current) by
-        which that of the whole trial is larger. It is that of the last turn where nothing moves.
-    """
-    chain = Chain([], model.surroundings)
-    step = SHIFT * model.surroundings.full_drive_squared
-    squared = chain.to_drive_squared(measurement.column(model.drive))
-    up, down = (model.predict(dataclasses.replace(measurement, columns={
-        **measurement.columns, model.drive: chain.to_drive(squared + change)}))
-        for change in (step, -step))
-    return (up - down) / (2.0 * step)
-
-
-def left_out(fit: WeightFit, response: np.ndarray, groups: np.ndarray,
-             load: np.ndarray | None = None, slope: np.ndarray | None = None) -> dict[str, Any]:
-    """
-    Return the metric of trials, mostly of other loads, that were left out of the fit.
-
-    Parameters
-    ----------
-    fit : WeightFit
-        Of H2.
-    response : ndarray, shape (n,)
-        Of the rows fitted, as measured.
-    groups : ndarray, shape (n,)
-        Trial of each row fitted.
-    load, slope : ndarray, shape (n,), optional
-        Their load, and their `drive_slope`.
-
-    Returns
-    -------
-    dict
-        'left_out', or nothing where there is one trial or none was left out.
-    """
-    if len(np.unique(groups)) < 2 or not np.isfinite(fit.held_out_rmse):
-        return {}
-    by_load = {} if load is None else rmse_by_load(fit.held_out, load, groups)
-    return {'left_out': {'rmse': fit.held_out_rmse, **by_load,
-                         **relative_rmse(fit.held_out, response, groups, slope)}}
 
 
 def _provenance(force: Measurement | None, force_trials: Sequence[float] | None,
