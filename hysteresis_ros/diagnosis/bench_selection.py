@@ -122,9 +122,22 @@ class BenchSelection:
 
     def _most_probable(self, fits: Sequence[Fit]) -> Fit:
         """Of those that predict loads held out alike, return the most probable by rows fitted."""
-        largest = (1.0 + self.settings.practical) * min(map(self.typical_error, fits))
-        return max((fit for fit in fits if self.typical_error(fit) <= largest),
+        best = min(fits, key=self.typical_error)
+        return max((fit for fit in fits if self._alike(fit, best)),
                    key=lambda fit: self._fitted_log_odds(fit, self.base))
+
+    def _alike(self, fit: Fit, best: Fit) -> bool:
+        """
+        Whether a fit predicts loads held out no worse than the best one does.
+
+        By less than matters, or by less than the standard error over the loads: of few loads one
+        that the others are extrapolated to may outweigh all others.
+        """
+        squares = (self.problem.squares(one.held_out) + self.problem.small_error ** 2
+                   for one in (fit, best))
+        ratios = 0.5 * np.log(np.divide(*squares))
+        error = float(np.std(ratios, ddof=1)) / math.sqrt(len(ratios)) if len(ratios) > 1 else 0.0
+        return bool(np.mean(ratios) <= max(math.log1p(self.settings.practical), error))
 
     def _judge(self, fits: Sequence[Fit], variants: Sequence[Fit]) -> list[Fit]:
         """

@@ -7,9 +7,10 @@ import inspect
 from importlib import metadata
 
 from hysteresis_ros.effects import (
-    ambient, cable_friction, cold_clamps, creep, electrical, encoder_eccentricity, formation_memory,
-    heat_loss, kinetics, material, measured_supply, mechanism, overload, phase_modulus, sensor,
-    thermal, thermal_expansion, transformation_slopes, valve_lag, viscoelastic_creep, wire_break)
+    ambient, cable_friction, cold_clamps, creep, electrical, encoder_eccentricity, fatigue,
+    formation_memory, heat_loss, kinetics, material, measured_supply, mechanism, overload,
+    phase_modulus, sensor, thermal, thermal_expansion, transformation_slopes, valve_lag,
+    viscoelastic_creep, wire_break)
 from hysteresis_ros.effects.base import Effect, STAGES
 from hysteresis_ros.effects.stages import (
     DriveEffect, MaterialEffect, MechanismEffect, SensorEffect)
@@ -26,7 +27,7 @@ DESCRIPTION = ('id', 'stage', 'sentence', 'equation', 'source', 'shows_in', 'exp
 def _own() -> list[type[Effect]]:
     found = []
     for module in (electrical, measured_supply, thermal, heat_loss, valve_lag, ambient, material,
-                   creep, viscoelastic_creep, transformation_slopes, phase_modulus,
+                   fatigue, creep, viscoelastic_creep, transformation_slopes, phase_modulus,
                    thermal_expansion, formation_memory, kinetics, overload, cold_clamps, mechanism,
                    cable_friction, wire_break, sensor, encoder_eccentricity):
         found += [member for member in vars(module).values()

@@ -94,6 +94,10 @@ class MaterialEffect(Effect):
         """Return the load [N] from which a muscle yields for good, and by how much then [m/N]."""
         return math.inf, 0.0
 
+    def on_drive(self) -> DriveEffect | None:
+        """Return what it does to the drive squared that the muscle feels, None if nothing."""
+        return None
+
     def shift_load(self, load: Values, surroundings: Surroundings) -> Values:
         """Return what is added to the load inside the transformation, in units of the load."""
         return 0.0 * load

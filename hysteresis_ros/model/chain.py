@@ -57,8 +57,10 @@ class Chain:
         # Voltage and current heat with their square (Eq. 2).
         self.heats_by_square = surroundings.drive in ELECTRIC_DRIVES
         self.electrical: list[DriveEffect] = _of_stage('electrical', ordered)
-        self.thermal: list[DriveEffect] = _of_stage('thermal', ordered)
         self.material: list[MaterialEffect] = _of_stage('material', ordered)
+        on_drive = (effect.on_drive() for effect in self.material)
+        self.thermal: list[DriveEffect] = [
+            *_of_stage('thermal', ordered), *(one for one in on_drive if one is not None)]
         self.mechanism: list[MechanismEffect] = _of_stage('mechanism', ordered)
         self.sensor: list[SensorEffect] = _of_stage('sensor', ordered)
         # Those to whose elongation time or history add.

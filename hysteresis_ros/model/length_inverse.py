@@ -163,7 +163,8 @@ class LengthInverse:
 
     def outcome(self, drive: float, force: float, inputs: Inputs) -> Outcome:
         """Say what a drive would do; commits nothing."""
-        drive_squared = self._steady.step(drive, inputs)
+        worn = self.worn(inputs, drive)
+        drive_squared = self._steady.step(drive, worn)
         output, committed = self.second.respond(self._first.peek(drive_squared), force)
         phase = (float(self._model.martensite(self.second.given(output, force)))
                  if self._chain.needs_phase else math.nan)
@@ -172,7 +173,7 @@ class LengthInverse:
             before = self._steady.save()
             # What the transformation leads to is that of this drive, not of the guess before it.
             offset, factor = self._steady.advance(
-                drive, drive_squared, self.worn(inputs, drive)._replace(phase=phase))
+                drive, drive_squared, worn._replace(phase=phase))
             self._steady.restore(before)
         base, felt = self.second.base, np.float64(force)
         length = (base + float(self._chain.scale(felt)) * factor * (output - base)
