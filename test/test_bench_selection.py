@@ -94,6 +94,24 @@ def test_of_two_effects_that_stand_for_each_other_each_alone_competes(selection,
         assert selection.unstable['fatigue'].startswith('cannot be determined here: vague; it')
 
 
+@pytest.mark.parametrize('most, last, probable', [
+    (0.2, 1.5, True), (0.29, 0.5, False), (0.3, 6.0, False)])
+def test_a_single_load_that_others_are_extrapolated_to_does_not_decide(
+        selection, most, last, probable):
+    """Where most loads are predicted better by far more than the standard error over all."""
+    base, problem = selection.base, selection.problem
+    best = of_share(selection, ('slack',), 0.3, 0.3)
+    # As far off on average, but alike on all.
+    worse = of_share(selection, ('slack',), 0.34, 0.1)
+    shares = np.where(problem.fold == problem.folds[-1], last, most)
+    other = dataclasses.replace(
+        worse, held_out=problem.measured + shares * (base.held_out - problem.measured))
+    assert selection.typical_error(best) * 1.05 < min(
+        selection.typical_error(worse), selection.typical_error(other))
+    assert selection._most_probable([best, worse]) is best
+    assert (selection._most_probable([best, other]) is other) == probable
+
+
 def growth(selection, high):
     """Return a fit whose strain grows with the load, and an effect whose growth may end beyond."""
     fit = of_share(selection, ('stress_dependent_strain', 'slack'), 0.3, 0.3)

@@ -61,6 +61,14 @@ def test_the_models_own_arm_reaches_every_target(names):
     np.testing.assert_allclose(angles, targets, rtol=0.0, atol=1e-6)
 
 
+def test_targets_are_reached_while_cycles_move_the_transformation():
+    model = bicep_model()
+    model = dataclasses.replace(model, effects=[effect_of(model, 'fatigue', b=0.05, c=0.4)])
+    angles, setpoints = drive_arm(model)
+    assert not any(setpoint.saturated for setpoint in setpoints)
+    np.testing.assert_allclose(angles, TARGETS, rtol=0.0, atol=1e-6)
+
+
 @pytest.mark.parametrize('linear', [0.5, 1.0])
 @pytest.mark.parametrize('time_constant', [0.0, 4.0])
 def test_targets_are_reached_where_an_arm_loses_heat_otherwise_than_the_bench(

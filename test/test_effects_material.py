@@ -165,6 +165,25 @@ def test_training_makes_the_stroke_grow():
     assert made.implausible() == []
 
 
+def test_cycles_move_the_transformation():
+    """Behind all that heats; its inverse adds what it takes off, for the cycles of that moment."""
+    given = inputs([1, 2, 3], [0.0, 1.0, 9.0])
+    chain = Chain([effect('fatigue', c=0.5), effect('airflow', beta=1.5)], WIRE)
+    felt = chain.drive_squared(np.full(3, 3.0), given)
+    np.testing.assert_allclose(felt, 6.0 - 0.5 * np.log([1.0, 2.0, 10.0]))
+    for row in range(3):
+        moment = Inputs(*(float(column[row]) for column in given))
+        assert chain.step(3.0, moment) == pytest.approx(felt[row])
+        assert chain.inverse(float(felt[row]), moment) == pytest.approx(3.0)
+    assert [one.id for one in Chain([effect('fatigue', b=0.1)], WIRE).thermal] == []
+    assert [one.id for one in chain.thermal] == ['airflow', 'fatigue']
+
+
+def test_what_moves_the_transformation_is_no_effect_by_itself():
+    assert sum(kind.__module__.endswith('.fatigue') for kind in catalogue().values()) == 1
+    assert effect('fatigue', c=0.5).within_trials().parameters[2].kinds == ('arm',)
+
+
 def test_wear_is_not_carried_over_where_it_could_be_the_load():
     worn = effect('fatigue', b=0.1).within_trials()
     kept = next(parameter for parameter in worn.parameters if parameter.name == 'kept')

@@ -3,6 +3,7 @@
 """What is kept of the sets of effects that were fitted to a recording."""
 
 import dataclasses
+import types
 
 from model_support import bicep_model, effect_of, runs
 import numpy as np
@@ -161,3 +162,24 @@ def test_what_may_be_noise_is_not_held_against_the_model(
         sets.keep_least(frozenset(), fit.predicted)
         sufficient += sets.sufficient(frozenset())
     assert at_least <= sufficient <= at_most
+
+
+@pytest.mark.parametrize('own, suffices, remembers, stays', [
+    (0.7, True, False, False), (0.7, False, False, True), (0.7, True, True, True),
+    (1.1, True, False, True)])
+def test_a_set_has_to_explain_more_than_fewer_effects_that_suffice(
+        sets, monkeypatch, own, suffices, remembers, stays):
+    """Whether or not they are among its own."""
+    one, two = frozenset(['encoder_offset']), frozenset(['geometry_error', 'supply_limit'])
+    errors = {one: own, two: 0.2}
+    always = types.SimpleNamespace(implausible=list)
+    for name, value in (
+            ('fits', dict.fromkeys(errors, always)), ('ranked', lambda: [two, one]),
+            ('p_values', {'encoder_offset': 0.01}), ('own_error', errors.get),
+            ('sufficient', lambda names: suffices or names == two),
+            ('_each_matters', lambda names: True), ('_surpassed', lambda names, others: False),
+            ('_remembers', lambda names, fewer: remembers),
+            ('_clearly_more_probable', lambda names, fewer: True),
+            ('covariance', types.SimpleNamespace(size=1.0))):
+        monkeypatch.setattr(sets, name, value)
+    assert sets.valid() == ([two, one] if stays else [one])

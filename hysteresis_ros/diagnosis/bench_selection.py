@@ -130,14 +130,18 @@ class BenchSelection:
         """
         Whether a fit predicts loads held out no worse than the best one does.
 
-        By less than matters, or by less than the standard error over the loads: of few loads one
-        that the others are extrapolated to may outweigh all others.
+        By less than matters; or most loads better, and all by less than the standard error over
+        them: one that the others are extrapolated to may outweigh all others.
         """
+        practical = self.settings.practical
         squares = (self.problem.squares(one.held_out) + self.problem.small_error ** 2
                    for one in (fit, best))
         ratios = 0.5 * np.log(np.divide(*squares))
-        error = float(np.std(ratios, ddof=1)) / math.sqrt(len(ratios)) if len(ratios) > 1 else 0.0
-        return bool(np.mean(ratios) <= max(math.log1p(self.settings.practical), error))
+        mean = float(np.mean(ratios))
+        if mean <= math.log1p(practical):
+            return True
+        most = np.mean(ratios < math.log1p(-practical)) > 0.5
+        return bool(most and mean <= np.std(ratios, ddof=1) / math.sqrt(len(ratios)))
 
     def _judge(self, fits: Sequence[Fit], variants: Sequence[Fit]) -> list[Fit]:
         """

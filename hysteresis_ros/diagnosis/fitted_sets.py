@@ -284,13 +284,17 @@ class FittedSets:
         itself with the drive, it remembers something of its own, and the set is clearly less
         probable without it. And without it the error is larger than the base model's own could be,
         or what stays is clearly less probable. A single effect also has to explain more than the
-        best of all would by chance; and no set of as few effects has a smaller residual, by more
-        than the base model's error and that of an effect's equation could be.
+        best of all would by chance; no set of as few effects has a smaller residual, by more than
+        the base model's error and that of an effect's equation could be; and no set of fewer
+        effects suffices with a residual that is as small but for the base model's error.
         """
         physical = [names for names in self.ranked() if not self.fits[names].implausible()]
-        return [names for names in physical if self._each_matters(names)
-                and (len(names) != 1 or self.p_values.get(next(iter(names)), 1.0) <= SIGNIFICANCE)
-                and not self._surpassed(names, physical)]
+        valid = [names for names in physical if self._each_matters(names)
+                 and (len(names) != 1 or self.p_values.get(next(iter(names)), 1.0) <= SIGNIFICANCE)
+                 and not self._surpassed(names, physical)]
+        return [names for names in valid if not any(
+            0 < len(fewer) < len(names) and self.sufficient(fewer)
+            and self._hardly_better(names, fewer) for fewer in valid)]
 
     def _each_matters(self, names: frozenset[str]) -> bool:
         error = self.own_error(names)
@@ -302,11 +306,20 @@ class FittedSets:
                         LEAST_SHARE * self.own_error(frozenset()))
             if before - error < least or self._would_do(without, names):
                 return False
-            if (before ** 2 - error ** 2 < self.covariance.size ** 2
-                    and not (self._remembers(names, without)
-                             and self._clearly_more_probable(names, without))):
+            if self._hardly_better(names, without):
                 return False
         return True
+
+    def _hardly_better(self, names: frozenset[str], fewer: frozenset[str]) -> bool:
+        """
+        Whether a set explains no more than one of fewer effects but for the base model's error.
+
+        As that repeats itself with the drive, it is more if all that the set has beyond remembers
+        something of its own and the set is clearly more probable.
+        """
+        gain = self.own_error(fewer) ** 2 - self.own_error(names) ** 2
+        return gain < self.covariance.size ** 2 and not (
+            self._remembers(names, fewer) and self._clearly_more_probable(names, fewer))
 
     def _remembers(self, names: frozenset[str], without: frozenset[str]) -> bool:
         """Whether what a set has more than a smaller one has a memory of its own."""
