@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from scipy import linalg, optimize, stats
+from scipy import optimize, stats
 
 from hysteresis_ros.diagnosis.covariance import Covariance, LARGEST_SCALE, TAILS
 from hysteresis_ros.diagnosis.discrepancy import Discrepancy
@@ -225,48 +225,6 @@ def test_the_largest_error_is_the_quantile_of_draws_of_any_scale():
     size = 0.01 * np.exp(0.8 * rng.standard_normal(200000)) * np.abs(rng.standard_normal(200000))
     expected = np.hypot(np.quantile(size, 0.95), 0.03)
     assert covariance.largest_error(rng, 20000) == pytest.approx(expected, rel=0.05)
-
-
-def uneven(steep=0.04, flat=0.002):
-    """Return covariances of a model that is off by much in a tenth of the rows."""
-    size = np.where(np.arange(ROWS) % 10 == 0, steep, flat)
-    found = Discrepancy(size[:, None], np.arange(float(ROWS))[:, None], np.zeros((ROWS, 0)),
-                        np.zeros(ROWS), np.zeros(ROWS), np.zeros((ROWS, 0)))
-    return size, Covariance(found, 30.0 * np.arange(1.0, ROWS + 1.0), np.zeros(ROWS, int),
-                            1e-6, np.inf, 0.3)
-
-
-def test_rows_are_judged_by_what_the_model_is_off_by_there():
-    """A residual like the discrepancy counts as it is, one that is alike everywhere for more."""
-    size, covariance = uneven()
-    assert make().weights == pytest.approx(np.ones(ROWS))
-    own, alike = (np.sqrt(np.mean((covariance.weights * one) ** 2))
-                  for one in (size, np.full(ROWS, covariance.size)))
-    assert own == pytest.approx(covariance.size)
-    assert alike > 1.8 * covariance.size
-    expected = 1.0 / np.sqrt(size ** 2 + covariance.size ** 2)
-    assert covariance.weights / expected == pytest.approx(
-        np.full(ROWS, covariance.weights[0] / expected[0]))
-    # They are those of the base model, whatever an effect makes of its error.
-    assert covariance.of(smooth(ROWS, 0.01)).weights is covariance.weights
-    assert make(0.0).weights == pytest.approx(np.ones(ROWS))
-
-
-def test_what_the_model_may_be_off_by_is_weighted_as_a_residual_is():
-    size, covariance = uneven()
-    plain, weighted = (covariance.largest_error(np.random.default_rng(3), 4000, weighted=one)
-                       for one in (False, True))
-    assert covariance.size < weighted
-    rng = np.random.default_rng(3)
-    values, vectors = linalg.eigh(covariance.discrepancy.matrix())
-    draws = vectors * np.sqrt(values) @ rng.standard_normal((ROWS, 4000))
-    errors = np.exp(0.3 * rng.standard_normal(4000)) * np.sqrt(
-        np.mean((covariance.weights[:, None] * draws) ** 2, axis=0))
-    assert weighted == pytest.approx(np.quantile(errors, 0.95), rel=1e-6) != plain
-    # Elsewhere it is more by far than the model could be off by, though it is no more on all rows.
-    elsewhere = np.where(size > 0.01, 0.0, covariance.size)
-    assert np.sqrt(np.mean(elsewhere ** 2)) < plain
-    assert np.sqrt(np.mean((covariance.weights * elsewhere) ** 2)) > weighted
 
 
 def test_the_scale_of_the_discrepancy_has_a_bound():

@@ -99,22 +99,6 @@ def noise_of(values: np.ndarray) -> float:
     return float(np.exp(values[3]))
 
 
-def _weights(discrepancy: Discrepancy, size: float) -> np.ndarray:
-    """
-    Return the weights of rows (n,) that an error is judged by, all 1 where it is alike everywhere.
-
-    A row counts in inverse proportion to what the model is off by there and, root mean square, on
-    all rows, so that none counts for nothing and none for all. Their scale is such that the root
-    mean square of the discrepancy stays what it is.
-    """
-    variance = discrepancy.variance
-    if not np.any(variance):
-        return np.ones(len(variance))
-    squares = 1.0 / (variance + size ** 2)
-    weights: np.ndarray = np.sqrt(squares * np.mean(variance) / np.mean(squares * variance))
-    return weights
-
-
 class Covariance:
     """
     Covariances of residuals on the rows of one problem.
@@ -140,9 +124,6 @@ class Covariance:
     discrepancy : Discrepancy
     size : float
         Root mean square of the discrepancy, but for what has one course.
-    weights : ndarray, shape (n,)
-        What a residual is multiplied by before its mean square is compared with that: an error that
-        the discrepancy has in a few rows says little of it, and much of another cause elsewhere.
     points : list of Point
         Covariances at hand; see `add`.
     """
@@ -155,7 +136,6 @@ class Covariance:
         self._gaps = [np.abs(clock[own, None] - clock[own]) for own in self._trials]
         self._spread = scale_spread
         self.size = discrepancy.size_besides_courses
-        self.weights = _weights(discrepancy, self.size)
         span = max(*(float(np.max(gaps)) for gaps in self._gaps), _TINY)
         steps = np.diff(clock)[np.diff(trial) == 0]
         shortest = max(float(np.median(steps)), 1e-9 * span) if len(steps) else span
@@ -256,7 +236,7 @@ class Covariance:
         return found
 
     def largest_error(self, rng: np.random.Generator, count: int, level: float = 0.95,
-                      courses: bool = True, weighted: bool = False) -> float:
+                      courses: bool = True) -> float:
         """
         Return the root mean square error that the discrepancy stays below, at a probability.
 
@@ -269,8 +249,6 @@ class Covariance:
             The probability.
         courses : bool
             Whether what has one course counts.
-        weighted : bool
-            Whether rows count by their `weights`.
 
         Returns
         -------
@@ -280,8 +258,6 @@ class Covariance:
         values, vectors = linalg.eigh(self.discrepancy.matrix(courses))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         draws = root @ rng.standard_normal((len(values), count))
-        if weighted:
-            draws *= self.weights[:, None]
         scale = np.exp(self._spread * rng.standard_normal(count))
         errors = scale * np.sqrt(np.mean(draws ** 2, axis=0))
         return float(np.hypot(np.quantile(errors, level), self.resolution))

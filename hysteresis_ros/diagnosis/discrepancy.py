@@ -115,12 +115,8 @@ class Discrepancy:
     @property
     def size_besides_courses(self) -> float:
         """The same without what has one course."""
-        return float(np.sqrt(np.mean(self.variance)))
-
-    @property
-    def variance(self) -> np.ndarray:
-        """Mean square in each row of the base model's own error without what has one course."""
-        return np.sum(self.parts ** 2, axis=1) + np.sum(self.common ** 2, axis=1)
+        return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1)
+                                     + np.sum(self.common ** 2, axis=1))))
 
     def shares(self, residual: np.ndarray) -> np.ndarray:
         """Return the shares (2,) of the `courses`, 0 to 1, that explain most of a residual (n,)."""

@@ -157,9 +157,8 @@ class FittedSets:
         """
         Return the RMSE of a set without the shares of what has one course (`Discrepancy.courses`).
 
-        What has one course is known but for its share, so that it hides nothing of another course:
-        the base model may be wrong by much and still miss nothing by little. Rows have weights
-        (`Covariance.weights`).
+        That is known but for its share, so that it hides nothing of another course: the base model
+        may be wrong by much and still miss nothing by little.
         """
         return self._errors_of(names)[2]
 
@@ -171,9 +170,8 @@ class FittedSets:
             least = self._least[names] if names in self._least else self.fitter.towards_least(fit)
             residuals = [self.problem.measured - one for one in (fit.predicted, least)]
             own = map((fit.covariance or self.covariance).discrepancy.besides_courses, residuals)
-            weights = self.covariance.weights
-            self._errors[names] = known = (fit.predicted, min(map(rms, residuals)),
-                                           min(rms(weights * one) for one in own))
+            self._errors[names] = known = (
+                fit.predicted, min(map(rms, residuals)), min(map(rms, own)))
         return known
 
     def noise_free_rmse(self, names: frozenset[str]) -> float:
@@ -186,11 +184,10 @@ class FittedSets:
         """
         square = self.own_error(names) ** 2
         noise = 0.0 if self.uneven(names) else self.fits[names].noise
-        share = rms(self.covariance.weights) ** 2
         beyond = square - self.largest_rmse ** 2
-        if share * noise ** 2 < beyond < share * (MUCH_MORE * noise) ** 2:
+        if noise ** 2 < beyond < (MUCH_MORE * noise) ** 2:
             noise = self._noise_at_most(names)
-        return math.sqrt(max(square - share * noise ** 2, 0.0))
+        return math.sqrt(max(square - noise ** 2, 0.0))
 
     def _noise_at_most(self, names: frozenset[str]) -> float:
         """Return the white noise of a set's residual that it stays below at 95 %."""
@@ -272,8 +269,7 @@ class FittedSets:
     def _largest_error(self, covariance: Covariance, level: float = ADEQUATE) -> float:
         """Return the RMS that a discrepancy stays below at a probability; see `own_error`."""
         return covariance.largest_error(
-            np.random.default_rng(self._seed), self.settings.draws, level, courses=False,
-            weighted=True)
+            np.random.default_rng(self._seed), self.settings.draws, level, courses=False)
 
     def valid(self) -> list[frozenset[str]]:
         """
