@@ -179,6 +179,14 @@ def test_cycles_move_the_transformation():
     assert [one.id for one in chain.thermal] == ['airflow', 'fatigue']
 
 
+@pytest.mark.parametrize('drive, kinds', [
+    ('voltage', ('arm',)), ('current', ('arm',)), ('power', ('arm',)), ('temperature', ()),
+    ('pressure', ())])
+def test_cycles_move_only_a_transformation_that_the_drive_heats(drive, kinds):
+    worn = {one.name: one for one in catalogue()['fatigue'].describe(WIRE._replace(drive=drive))}
+    assert worn['c'].kinds == kinds and worn['b'].kinds == ('arm', 'bench')
+
+
 def test_what_moves_the_transformation_is_no_effect_by_itself():
     assert sum(kind.__module__.endswith('.fatigue') for kind in catalogue().values()) == 1
     assert effect('fatigue', c=0.5).within_trials().parameters[2].kinds == ('arm',)

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What cycles do to a muscle: wear, and training."""
 
+import dataclasses
+
 import numpy as np
 
 from hysteresis_ros.effects.base import Effect, Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.stages import DriveEffect, MaterialEffect
 
 
@@ -46,6 +49,14 @@ class Fatigue(MaterialEffect):
                   choices=(1.0, 0.0), kinds=('bench',)))
 
     memory = ('_begun',)
+
+    @classmethod
+    def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
+        """Leave c neutral where the drive does not heat the muscle against its surroundings."""
+        heated = surroundings is None or surroundings.drive in (*ELECTRIC_DRIVES, 'power')
+        return tuple(dataclasses.replace(parameter, kinds=())
+                     if parameter.name == 'c' and not heated else parameter
+                     for parameter in super().describe(surroundings))
 
     # Cycles at the start of the trial; None before its first row.
     _begun: float | None
@@ -92,7 +103,7 @@ class Fatigue(MaterialEffect):
 
 class LaterTransformation(DriveEffect):
     """
-    Drive squared that a worn muscle needs besides what a new one does; no effect of its own.
+    Rise of the transformation by wear, taken off the drive squared; no effect of its own.
 
     Parameters
     ----------
