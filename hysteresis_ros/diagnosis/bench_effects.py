@@ -24,6 +24,7 @@ from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.replicates import with_replicates
+from hysteresis_ros.diagnosis.restarts import best_of_restarts
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.effects.kinetics import Kinetics
@@ -131,6 +132,7 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     """Return the model with the effects found and usual but for some, and those effects."""
     known = _with_universal(
         model, [effect for effect in found if effect.id not in excluded], problem, excluded)
+    known = best_of_restarts(BenchFitter(problem.finer()), known, Settings().practical)
     known = _in_simpler_terms(BenchFitter(problem.finer()), known, excluded)
     if ThermalExpansion.id not in excluded:
         known = with_expansion(BenchFitter(problem.finer()), known, Settings().practical)

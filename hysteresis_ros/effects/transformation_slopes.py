@@ -31,8 +31,8 @@ class TransformationSlopes(MaterialEffect):
     confused_with = ('stress_dependence', 'r_phase')
     kinds = ('bench',)
     parameters = (
-        # As of `phase_modulus`, a fiftieth is no more than what is told apart on a bench.
-        Parameter('g', '1', "growth of the loop's width with the load, 1 - C_A / C_M", 0.02, 1.3,
+        # A fiftieth would be named on benches of grains whose slopes are alike.
+        Parameter('g', '1', "growth of the loop's width with the load, 1 - C_A / C_M", 0.05, 1.3,
                   0.0, (-0.3, 0.2), both_signs=True, limits=(-2.0, 0.9)),)
 
     def loop_width(self, load: Values, surroundings: Surroundings) -> Values:
