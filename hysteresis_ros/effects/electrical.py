@@ -82,7 +82,7 @@ class PwmDeadZone(ElectricalEffect):
     # Largest duty of pulses that drop out, as the voltage over that of a zone that is stretched.
     LARGEST = 8.0 / 3.0
     # Starts for what arrives whole above, over the same: no further apart than a fit finds its way.
-    CUTS = tuple(0.8 * 1.1 ** step for step in range(13))
+    CUTS = tuple(0.8 * 1.05 ** step for step in range(25))
 
     def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
         """Begin also with pulses that drop out: no slope says where they do."""

@@ -353,7 +353,6 @@ LATER = {
                                _formation_memory, bench=True),
     'cold_clamps': Effect("Heavy clamps keep the ends of the arm's wires cold; the bench has long "
                           'wires.', _cold_clamps),
-    'supply_limit': Effect('The board limits the current of each wire.', _supply_limit),
 }
 
 # What only a bench tells; an arm has the wire of its bench.
@@ -361,6 +360,9 @@ OF_WIRES = {
     'thermal_expansion': Effect('The wire expands with its temperature.', _thermal_expansion,
                                 bench=True),
 }
+
+# What was added after that.
+LATEST = {'supply_limit': Effect('The board limits the current of each wire.', _supply_limit)}
 
 # Here stood a torn wire while no catalogue had it.
 BEFORE = 'unlisted_flexed_lead'
@@ -373,7 +375,7 @@ def _in_order() -> dict[str, Effect]:
         if name == BEFORE:
             found.update(TORN)
         found[name] = Effect(kind.__doc__ or '', _disturb(kind), listed=False)
-    return {**found, **LATER, **OF_WIRES}
+    return {**found, **LATER, **OF_WIRES, **LATEST}
 
 
 EFFECTS = _in_order()
@@ -381,7 +383,7 @@ EFFECTS = _in_order()
 
 def hidden_effects() -> tuple[str, ...]:
     """Return the names of the effects that the catalogue has for an arm, too."""
-    return (*LISTED, *LATER, *TORN)
+    return (*LISTED, *LATER, *TORN, *LATEST)
 
 
 def unlisted_effects() -> tuple[str, ...]:
