@@ -112,6 +112,16 @@ def test_a_single_load_that_others_are_extrapolated_to_does_not_decide(
     assert (selection._most_probable([best, other]) is other) == probable
 
 
+@pytest.mark.parametrize('worse, alike', [(1.2, True), (1.4, True), (2.5, False)])
+def test_of_many_loads_some_do_decide(worse, alike):
+    """Three of eight that are far off raise the mean by more than its standard error."""
+    problem = types.SimpleNamespace(squares=lambda errors: errors ** 2, small_error=0.0)
+    selection = types.SimpleNamespace(settings=Settings(), problem=problem)
+    fit, best = (types.SimpleNamespace(held_out=np.array(errors)) for errors in (
+        [0.9] * 5 + [worse] * 3, [1.0] * 8))
+    assert BenchSelection._alike(selection, fit, best) == alike
+
+
 def growth(selection, high):
     """Return a fit whose strain grows with the load, and an effect whose growth may end beyond."""
     fit = of_share(selection, ('stress_dependent_strain', 'slack'), 0.3, 0.3)

@@ -169,3 +169,9 @@ def test_a_set_has_to_explain_more_than_fewer_effects_that_suffice(
             ('covariance', types.SimpleNamespace(size=1.0))):
         monkeypatch.setattr(sets, name, value)
     assert sets.valid() == ([two, one] if stays else [one])
+    # Whether none suffices is asked of each effect of a set.
+    none = frozenset()
+    monkeypatch.setattr(sets, 'ranked', lambda: [two, none])
+    monkeypatch.setitem(errors, none, 0.7)
+    monkeypatch.setitem(sets.fits, none, always)
+    assert sets.valid() == [two, none]

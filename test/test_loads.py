@@ -33,6 +33,16 @@ def tables(names=('length.csv', 'force.csv'), experiment='bench', seed=3):
     return [Measurement.from_columns(found[name], source=name) for name in names]
 
 
+def test_each_part_of_a_bench_has_the_slope_of_its_own_rows():
+    """Trials that verify, those that are fitted, and as many of these as were left out."""
+    length, force = tables()
+    metrics = identify(length, force, **FAR_APART).model.metrics['length']
+    slope = drive_slope(identify(length, force, **FAR_APART).model, length)
+    fitted = np.isin(length.column('trial'), FAR_APART['length_trials'])
+    for part, rows in (('identification', fitted), ('verification', ~fitted), ('left_out', fitted)):
+        assert metrics[part]['drive_slope'] == pytest.approx(np.sqrt(np.mean(slope[rows] ** 2)))
+
+
 @pytest.fixture(scope='module')
 def two_loads():
     """Return the model of a bench without any load between its least and its largest."""
