@@ -102,7 +102,7 @@ def test_a_drift_starts_at_rates_that_suit_the_recording():
     drift = catalogue()['ambient_drift'](PAPER)
     for hours in (0.3, 1.5):
         clock = np.linspace(0.0, 3600.0 * hours, 50)
-        for values in drift.moments(np.zeros(50), clock):
+        for values in drift.moments(np.zeros(50), np.zeros(50), clock):
             total = drift.with_values(**values).total(clock)
             waves = 'sine' in values
             # A wave swings to both sides; 50 rows just miss its ends.

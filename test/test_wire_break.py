@@ -136,11 +136,11 @@ def test_a_fit_starts_where_the_residual_changes(row):
     # The arm sinks by as much as its angle lets it.
     residual[row:] += 0.05 * (1.0 + np.sin(np.arange(200 - row)))
     clock = 30.0 * np.arange(1.0, 201.0)
-    start, *others = effect_of(MODEL, 'wire_break').moments(residual, clock)
+    start, *others = effect_of(MODEL, 'wire_break').moments(residual, 0.0 * residual, clock)
     assert clock[row - 1] <= start['time'] < clock[row] < 1.02 * start['time']
     # Others lie before and after it.
     assert sorted([*(other['time'] < start['time'] for other in others)]) == [False, True]
-    assert effect_of(MODEL, 'wire_break').moments(residual[:5], clock[:5]) == []
+    assert effect_of(MODEL, 'wire_break').moments(residual[:5], clock[:5], clock[:5]) == []
 
 
 def test_a_fit_starts_at_the_break_although_the_arm_falls_later():
@@ -150,7 +150,8 @@ def test_a_fit_starts_at_the_break_although_the_arm_falls_later():
     residual[80:] += 0.03 * rng.standard_normal(120)
     residual[170:] += 0.6
     clock = 5.0 * np.arange(1.0, 201.0)
-    starts = [start['time'] for start in effect_of(MODEL, 'wire_break').moments(residual, clock)]
+    starts = [start['time'] for start in effect_of(MODEL, 'wire_break').moments(
+        residual, 0.0 * residual, clock)]
     assert clock[168] <= starts[0] < clock[171]
     assert any(clock[78] <= start < clock[81] for start in starts)
 

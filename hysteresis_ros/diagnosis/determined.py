@@ -31,10 +31,10 @@ def not_determined(effect: Effect, kind: str) -> str | None:
     """
     Return why recordings do not determine the size of a fitted effect, None if they do.
 
-    The size is the first parameter. It is not determined where its interval spans the whole
+    The size is `Effect.size_parameter`. It is not determined where its interval spans the whole
     physical range, or where one too small to matter lies inside: then nothing shows the effect.
     """
-    size = effect.parameters[0]
+    size = effect.size_parameter
     notes = [note for note in undetermined(effect, kind) if f'{effect.id}.{size.name} ' in note]
     if notes:
         return notes[0]

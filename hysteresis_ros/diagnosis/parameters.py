@@ -147,8 +147,8 @@ def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
                                     for parameter, value in zip(fitted, combination)})
               for combination in combinations]
     guesses = [] if measured is None else effect.guesses(measured)
-    if residual is not None and clock is not None:
-        guesses = [*guesses, *effect.moments(residual, clock)]
+    if measured is not None and residual is not None and clock is not None:
+        guesses = [*guesses, *effect.moments(residual, measured, clock)]
     # A guess of what this kind of measurement does not show is none.
     names = {parameter.name for parameter in fitted}
     return starts + [starts[0].with_values(**guess) for guess in guesses

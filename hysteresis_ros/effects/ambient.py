@@ -110,7 +110,8 @@ class AmbientDrift(ThermalEffect):
             found = found + self.sine * np.sin(turned) + self.cosine * np.cos(turned)
         return found
 
-    def moments(self, residual: np.ndarray, clock: np.ndarray) -> list[dict[str, float]]:
+    def moments(self, residual: np.ndarray, response: np.ndarray, clock: np.ndarray
+                ) -> list[dict[str, float]]:
         """Return rates at which a room of half the usual range changes, and small waves."""
         largest, duration = self.parameters[0].high, max(float(np.ptp(clock)), 1.0)
         half = 0.5 * largest * self.CLOCK_UNIT / duration

@@ -319,6 +319,11 @@ class Effect(abc.ABC):
         for name in self.memory:
             setattr(self, name, state[name])
 
+    @property
+    def size_parameter(self) -> Parameter:
+        """The parameter that is its size in the form that it has."""
+        return self.parameters[0]
+
     def in_limit(self) -> bool:
         """Whether its intervals reach the limit in which it is `limit`."""
         return False
@@ -393,8 +398,18 @@ class Effect(abc.ABC):
         """Return values by name that the measured response (n,) suggests to start a fit from."""
         return []
 
-    def moments(self, residual: np.ndarray, clock: np.ndarray) -> list[dict]:
-        """Return values by name that a residual (n,) at times (n,) [s] suggests to start from."""
+    def moments(self, residual: np.ndarray, response: np.ndarray, clock: np.ndarray
+                ) -> list[dict]:
+        """
+        Return values by name that a residual suggests to start from.
+
+        Parameters
+        ----------
+        residual, response : ndarray, shape (n,)
+            In the response's unit.
+        clock : ndarray, shape (n,)
+            Time since the recording began [s].
+        """
         return []
 
     @classmethod

@@ -7,14 +7,8 @@ import math
 import numpy as np
 
 from hysteresis_ros.effects.base import Parameter, Surroundings
+from hysteresis_ros.effects.change_point import change_points, NEVER
 from hysteresis_ros.effects.stages import MechanismEffect
-
-# On each side of the event at least so many rows, and this share of all, are needed.
-LEAST_ROWS, MARGIN = 3, 0.04
-# How far before the first row after the event, as a share of its time, a fit starts.
-BEFORE = 0.01
-# A time [s] at which no recording goes on any more, the last one that a fit can come to: no break.
-NEVER = 5e5
 
 
 class WireBreak(MechanismEffect):
@@ -49,37 +43,7 @@ class WireBreak(MechanismEffect):
         """Return when a muscle breaks [s]; infinite if none does."""
         return self.time if 0.0 < self.time < NEVER else math.inf
 
-    def moments(self, residual: np.ndarray, clock: np.ndarray) -> list[dict[str, float]]:
-        """
-        Return moments at which the residual changes in its mean and size.
-
-        The largest change, and that of the rows before and after it: where the load throws the arm
-        from one end to the other, that may come long after the break.
-        """
-        found, parts = [], [(0, len(residual))]
-        change = _change(residual)
-        if change is not None:
-            parts += [(0, change), (change, len(residual))]
-        for first, end in parts:
-            change = _change(residual[first:end])
-            if change is not None:
-                last, row = clock[first + change - 1:first + change + 1].tolist()
-                time = (1.0 - BEFORE) * row
-                found.append({'time': time if time > last else 0.5 * (last + row)})
-        return found
-
-
-def _change(residual: np.ndarray) -> int | None:
-    """Return the first row (n,) of another mean and size than before; None where n is small."""
-    count = len(residual)
-    margin = max(LEAST_ROWS, int(MARGIN * count))
-    if count < 2 * margin + 1:
-        return None
-    before = np.arange(margin, count - margin + 1)
-    logs = np.zeros(len(before))
-    # Gaussian noise of another mean and size on each side (a change point's likelihood).
-    for values, rows in ((residual, before), (residual[::-1], count - before)):
-        sums, squares = np.cumsum(values), np.cumsum(values ** 2)
-        variance = squares[rows - 1] / rows - (sums[rows - 1] / rows) ** 2
-        logs += rows * np.log(np.maximum(variance, 1e-12 * squares[-1] + 1e-300))
-    return int(before[np.argmin(logs)])
+    def moments(self, residual: np.ndarray, response: np.ndarray, clock: np.ndarray
+                ) -> list[dict[str, float]]:
+        """Return moments at which the residual changes in its mean and size."""
+        return [{'time': time} for time in change_points(residual, clock)]
