@@ -112,6 +112,25 @@ def test_a_single_load_that_others_are_extrapolated_to_does_not_decide(
     assert (selection._most_probable([best, other]) is other) == probable
 
 
+@pytest.mark.parametrize('most, last, fitted, fewer', [
+    (0.3, 0.6, 0.3, True), (0.45, 0.45, 0.3, False), (0.3, 0.6, 0.6, False)])
+def test_an_effect_that_rows_fitted_do_not_ask_for_needs_all_loads(
+        selection, monkeypatch, most, last, fitted, fewer):
+    """One of the loads that are held out may be predicted better by chance."""
+    problem = selection.problem
+    both, alone = (of_share(selection, names, 0.3, share) for names, share in (
+        (('slack', 'fatigue'), 0.3), (('slack',), fitted)))
+    shares = np.where(problem.fold == problem.folds[-1], last, most)
+    alone = dataclasses.replace(alone, held_out=problem.measured + shares * (
+        selection.base.held_out - problem.measured))
+    monkeypatch.setattr(selection, '_parameters', lambda fit: len(fit.effects))
+    assert selection.typical_error(alone) > 1.05 * selection.typical_error(both)
+    assert (selection._most_probable([both, alone]) is alone) == fewer
+    # With as many effects it has to predict as well on average.
+    other = dataclasses.replace(alone, effects=both.effects)
+    assert selection._most_probable([both, other]) is both
+
+
 @pytest.mark.parametrize('worse, alike', [(1.2, True), (1.4, True), (2.5, False)])
 def test_of_many_loads_some_do_decide(worse, alike):
     """Three of eight that are far off raise the mean by more than its standard error."""
@@ -134,8 +153,12 @@ def test_growth_whose_end_no_row_shows_is_that_of_a_softer_martensite(selection,
     """In proportion to the load both are the same, and that one has a parameter less."""
     straight = catalogue()['stress_dependent_strain']().parameters[1].bounds[1]
     fit, effects = growth(selection, straight)
-    softer, worse = (of_share(selection, ('phase_modulus', 'slack'), share, 0.3)
-                     for share in (0.31, 0.4))
+    softer, alike, worse = (of_share(selection, ('phase_modulus', 'slack'), share, 0.3)
+                            for share in (0.31, 0.4, 0.4))
+    # As far off on average, but by more than the spread over the loads on none but one.
+    shares = np.where(selection.problem.fold == selection.problem.folds[-1], 0.9, 0.3)
+    alike = dataclasses.replace(alike, held_out=selection.problem.measured + shares * (
+        selection.base.held_out - selection.problem.measured))
 
     def taken(rival, high=straight, notes=(), unstable=()):
         monkeypatch.setattr(selection.fitter, 'with_intervals',
@@ -146,7 +169,7 @@ def test_growth_whose_end_no_row_shows_is_that_of_a_softer_martensite(selection,
         monkeypatch.setattr(selection, 'unstable', dict.fromkeys(unstable, 'not named again'))
         selection._take_simpler()
         return selection.found is rival
-    assert effects[0].in_limit() and taken(softer)
+    assert effects[0].in_limit() and taken(alike) and taken(softer)
     assert selection.unstable['stress_dependent_strain'].startswith(
         'cannot be determined here: it may as well be phase_modulus; it')
     # The rows show the end; or that one is worse, not determined either, or was left out.
@@ -178,10 +201,11 @@ def test_what_identification_adds_is_said_in_simpler_terms_too(selection, monkey
                 effects[0].intervals['F0'] = 0.5, high
             return effects
         monkeypatch.setattr(fitter, 'with_intervals', intervals)
+        measured = fitter.problem.measured
+        error = 100.0 * fitter.problem.small_error * np.ones(len(measured))
         monkeypatch.setattr(fitter, 'cross_validate', lambda fit: types.SimpleNamespace(
-            held_out=fit.names))
-        monkeypatch.setattr(fitter.problem, 'typical_error', lambda held_out: (
-            1.0 if held_out == ('stress_dependent_strain',) else worse))
+            held_out=measured + error * (
+                1.0 if fit.names == ('stress_dependent_strain',) else worse)))
         return [effect.id for effect in bench_effects._in_simpler_terms(fitter, known, excluded)]
     assert names(straight) == ['phase_modulus']
     assert names(straight, 1.04) == ['phase_modulus']

@@ -9,7 +9,8 @@ import pytest
 
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.diagnosis.bench_effects import add_effects
-from hysteresis_ros.diagnosis.restarts import best_of_restarts
+from hysteresis_ros.diagnosis.bench_search import BenchSearch
+from hysteresis_ros.diagnosis.restarts import at_other_shifts
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import experiment_tables
@@ -22,42 +23,63 @@ class Fitter:
 
     def __init__(self, errors, implausible=()):
         self.errors, self.odd = errors, implausible
-        self.problem = types.SimpleNamespace(jobs=1)
-
-    def apart(self):
-        """Return itself."""
-        return self
 
     def fit(self, effects):
         """Return a fit at the nearest shift."""
         nearest = min(self.errors, key=lambda one: abs(one - effects[-1].C))
         return types.SimpleNamespace(
             effects=[*effects[:-1], effects[-1].with_values(C=nearest)],
+            names=tuple(effect.id for effect in effects),
             predicted=np.array([self.errors[nearest]]),
             implausible=lambda: ['C'] if nearest in self.odd else [])
+
+    def fit_below(self, effects, error):
+        """Return the same, or None where it promises too little."""
+        fit = self.fit(effects)
+        return fit if self.error(fit.predicted) <= error else None
 
     def error(self, predicted):
         """Return it."""
         return predicted[0]
 
-    def with_intervals(self, fit):
-        """Return the effects."""
-        return fit.effects
+
+@pytest.fixture
+def search(monkeypatch):
+    """Return what makes a search of a fitter, with one process."""
+    def made(fitter):
+        own = object.__new__(BenchSearch)
+        own.fitter, own._practical = fitter, 0.1
+        monkeypatch.setattr(own, '_in_parallel', lambda task, fitter, items: [
+            fit for fit in (task(fitter, item) for item in items) if fit is not None])
+        return own
+    return made
 
 
 @pytest.mark.parametrize('errors, implausible, found', [
     ({0.43: 2.0, 0.38: 1.0}, (), 0.38), ({0.43: 1.0, 0.38: 2.0}, (), 0.43),
     ({0.43: 2.0, 0.38: 1.0}, (0.38,), 0.43), ({0.43: 1.0, 0.38: 0.91}, (), 0.43),
-    ({0.43: 1.0, 0.38: 0.89}, (), 0.38), ({0.43: 2.0, 0.38: np.nan, 0.5: 1.0}, (), 0.5)])
-def test_the_shift_with_the_least_error_is_found(errors, implausible, found):
+    ({0.43: 1.0, 0.38: 0.89}, (), 0.38), ({0.43: 2.0, 0.38: np.nan, 0.5: 1.0}, (), 0.5),
+    ({0.43: 3.0, 0.38: 1.0, 0.5: 2.0}, (), 0.38), ({0.43: 3.0, 0.38: 2.0, 0.5: 1.0}, (), 0.5)])
+def test_the_shift_with_the_least_error_is_found(search, errors, implausible, found):
+    fitter = Fitter(errors, implausible)
     effects = [catalogue()['slack'](Ls=1.0), catalogue()['stress_dependence'](C=0.43)]
-    slack, shift = best_of_restarts(Fitter(errors, implausible), effects, 0.1)
-    assert (slack.id, shift.C) == ('slack', found)
+    fit, = search(fitter)._begun_at_other_shifts([fitter.fit(effects)])
+    assert fit.names == ('slack', 'stress_dependence')
+    assert fit.effects[1].C == found and fit.effects[0].Ls == 1.0
 
 
-def test_without_a_shift_nothing_is_fitted():
-    effects = [catalogue()['slack'](Ls=1.0)]
-    assert best_of_restarts(None, effects, 0.05) == effects
+def test_each_set_begins_at_others_and_keeps_its_place(search):
+    fitter = Fitter({0.43: 2.0, 0.38: 1.0})
+    shift = catalogue()['stress_dependence'](C=0.43)
+    fits = [fitter.fit(effects) for effects in (
+        [shift], [catalogue()['slack'](Ls=1.0), shift], [catalogue()['fatigue'](b=1.0), shift])]
+    found = search(fitter)._begun_at_other_shifts(fits)
+    assert [fit.names for fit in found] == [fit.names for fit in fits]
+    assert [fit.effects[-1].C for fit in found] == [0.38] * 3
+
+
+def test_without_a_shift_nothing_is_begun():
+    assert at_other_shifts([catalogue()['slack'](Ls=1.0)]) == []
 
 
 @pytest.mark.slow

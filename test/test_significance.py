@@ -4,9 +4,11 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from hysteresis_ros.diagnosis.significance import (
-    block_sums, cosines, gain_interval, paired_p_values, residualise, schwarz_log_odds)
+    block_sums, cosines, gain_interval, paired_p_values, residualise, schwarz_log_odds,
+    surely_larger)
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():
@@ -63,3 +65,18 @@ def test_schwarz_odds_are_those_of_hand_and_find_the_true_number_of_parameters()
             errors.append(np.sqrt(np.mean((measured + 3.0 * true - found) ** 2)))
         preferred += schwarz_log_odds(*errors, rows, 1) > 0.0
     assert 0.06 < preferred / draws < 0.11
+
+
+@pytest.mark.parametrize('ratios, surely', [
+    ((1.2, 1.25, 1.3, 1.2), True), ((1.0, 1.0, 1.0, 2.0), False), ((0.9, 1.1, 1.2, 1.0), False),
+    ((0.8, 0.75, 0.8, 0.85), False), ((1.5,), False), ((1.001, 1.0011, 1.0009, 1.001), True)])
+def test_errors_are_surely_larger_where_chance_over_the_folds_is_not_enough(ratios, surely):
+    """As scipy's paired t-test of the logarithms says, one-sided."""
+    squares = np.array(ratios) ** 2
+    others = 4.0 * np.ones(len(ratios))
+    assert surely_larger(4.0 * squares, others, 0.0) == surely
+    if len(ratios) > 1:
+        test = stats.ttest_1samp(np.log(ratios), 0.0, alternative='greater')
+        assert (test.pvalue < 0.05) == surely
+    # Errors that are too small to matter are alike.
+    assert not surely_larger(4.0 * squares, others, 1e9)

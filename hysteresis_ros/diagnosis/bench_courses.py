@@ -74,12 +74,6 @@ class BenchCourses:
         other._courses, other._excitations = dict(self._courses), dict(self._excitations)
         return other
 
-    def forgotten(self) -> BenchCourses:
-        """Return the same without anything that was computed before."""
-        other = copy.copy(self)
-        other._courses, other._excitations = {}, {}
-        return other
-
     def of(self, effects: Sequence[Effect], feedback: Feedback | None) -> Course:
         """
         Return the course for effects.

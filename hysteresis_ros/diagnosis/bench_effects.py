@@ -24,7 +24,6 @@ from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.replicates import with_replicates
-from hysteresis_ros.diagnosis.restarts import best_of_restarts
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.effects.kinetics import Kinetics
@@ -132,7 +131,6 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     """Return the model with the effects found and usual but for some, and those effects."""
     known = _with_universal(
         model, [effect for effect in found if effect.id not in excluded], problem, excluded)
-    known = best_of_restarts(BenchFitter(problem.finer()), known, Settings().practical)
     known = _in_simpler_terms(BenchFitter(problem.finer()), known, excluded)
     if ThermalExpansion.id not in excluded:
         known = with_expansion(BenchFitter(problem.finer()), known, Settings().practical)
@@ -148,8 +146,8 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
 def _in_simpler_terms(fitter: BenchFitter, known: Sequence[Effect], excluded: Collection[str]
                       ) -> list[Effect]:
     """Return the effects known, with simpler ones for those that may as well be these."""
-    def held_out(one: Fit) -> float:
-        return fitter.problem.typical_error(fitter.cross_validate(one).held_out)
+    def held_out(one: Fit) -> np.ndarray:
+        return np.asarray(fitter.cross_validate(one).held_out)
 
     fit = fitter.fit(known)
     for effect in fitter.with_intervals(fit):
@@ -160,8 +158,8 @@ def _in_simpler_terms(fitter: BenchFitter, known: Sequence[Effect], excluded: Co
         simpler = fitter.fit([*(one for one in fit.effects if one.id != effect.id), new])
         found = fitter.with_intervals(simpler)
         if not (simpler.implausible() or _undetermined([one for one in found if one.id == name])
-                or held_out(simpler)
-                > (1.0 + Settings().practical) * held_out(fit)):
+                ) and fitter.problem.predicts_as_well(
+                    held_out(simpler), held_out(fit), Settings().practical):
             return found
     return list(known)
 

@@ -21,7 +21,7 @@ from scipy import sparse
 from hysteresis_ros.diagnosis.bench_courses import BenchCourses
 from hysteresis_ros.diagnosis.bench_design import Design, Feedback, operator_with, weight_sizes
 from hysteresis_ros.diagnosis.problem import Problem
-from hysteresis_ros.diagnosis.significance import typical_error
+from hysteresis_ros.diagnosis.significance import surely_larger, typical_error
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench_metrics import drive_slope, left_out
@@ -109,7 +109,6 @@ class BenchProblem(Problem):
         """Begin without anything that was computed before."""
         self._holding_out: BenchProblem | None = None
         self._passive: dict[bytes | None, np.ndarray] = {}
-        self._courses = self._courses.forgotten()
         self._phases_of: tuple | None = None
         self._known_phases: list[np.ndarray] = []
         self._known_kinetics: np.ndarray | None = None
@@ -179,6 +178,17 @@ class BenchProblem(Problem):
         """
         return float(typical_error(
             self.squares(response), self.small_error if least is None else least))
+
+    def predicts_as_well(self, response: np.ndarray, other: np.ndarray, practical: float) -> bool:
+        """
+        Whether rows held out may be predicted by a response (n,) as well as by another one.
+
+        Its typical error is larger by no more than what matters, a share `practical`, or by no
+        more than chance over the folds may make of it.
+        """
+        if self.typical_error(response) <= (1.0 + practical) * self.typical_error(other):
+            return True
+        return not surely_larger(self.squares(response), self.squares(other), self.small_error)
 
     @property
     def left_out_together(self) -> np.ndarray:

@@ -20,11 +20,13 @@ from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.forms import other_forms, simplest_forms
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.restarts import at_other_shifts
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.workers import delayed, in_parallel, map_in_forks, must_be_sent
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.bench_problem import BenchProblem
+    from hysteresis_ros.diagnosis.settings import Settings
     from hysteresis_ros.workers import Progress
 
 # Sets of each size that are grown by one more effect, and judged on held-out rows.
@@ -45,17 +47,17 @@ class BenchSearch:
         Fits them again, on a finer grid.
     names : sequence of str
         Effects that the tables can show.
-    most : int
-        Effects in a set, at most.
+    settings : Settings
     jobs : int
         Processes.
     progress : callable
     """
 
-    def __init__(self, problem: BenchProblem, fitter: BenchFitter, names: Sequence[str], most: int,
-                 jobs: int, progress: Progress) -> None:
+    def __init__(self, problem: BenchProblem, fitter: BenchFitter, names: Sequence[str],
+                 settings: Settings, jobs: int, progress: Progress) -> None:
         self._coarse, self.fitter = BenchFitter(problem), fitter
-        self._names, self._most = names, most
+        self._names, self._most = names, settings.most_on_bench
+        self._practical = settings.practical
         self._jobs, self._progress = jobs, progress
 
     def run(self) -> tuple[list[Fit], list[Fit]]:
@@ -72,6 +74,7 @@ class BenchSearch:
         """
         fits = self._begun_where_larger_ended(
             self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
+        fits = self._begun_at_other_shifts(fits)
         return fits, [*self._in_other_forms(fits), *self._in_simplest_forms(fits)]
 
     def cross_validated(self, fits: Sequence[Fit]) -> list[Fit]:
@@ -159,6 +162,23 @@ class BenchSearch:
             names = frozenset(fit.names)
             if self.fitter.error(fit.predicted) < errors[names]:
                 found[names] = fit
+        return list(found.values())
+
+    def _begun_at_other_shifts(self, fits: Sequence[Fit]) -> list[Fit]:
+        """
+        Return fits, again from other shifts by the load where that gives so much less error.
+
+        See `restarts`.
+        """
+        found = {fit.names: fit for fit in fits}
+        errors = {fit.names: self.fitter.error(fit.predicted) for fit in fits}
+        for fit in self._in_parallel(_fitted_below, self.fitter, [
+                (effects, (1.0 + WORTH_JUDGING) * errors[one.names])
+                for one in fits for effects in at_other_shifts(one.effects)]):
+            error = self.fitter.error(fit.predicted)
+            if error < (1.0 - self._practical) * errors[fit.names] and not fit.implausible():
+                if error < self.fitter.error(found[fit.names].predicted):
+                    found[fit.names] = fit
         return list(found.values())
 
     def _in_other_forms(self, fits: Sequence[Fit]) -> list[Fit]:
@@ -291,7 +311,7 @@ def _judged(fitter: BenchFitter, fit: Fit) -> Fit | None:
 
 def _vanished(effect: Effect) -> bool:
     """Whether the size of an effect has come out neutral, from where no fit begins."""
-    size = effect.parameters[0]
+    size = effect.size_parameter
     return effect.values[size.name] == size.neutral
 
 

@@ -25,6 +25,7 @@ from hysteresis_ros.diagnosis.bench_search import (
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.significance import SIGNIFICANCE
 from hysteresis_ros.effects import catalogue, Effect
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.settings import Settings
     from hysteresis_ros.workers import Progress
 
-SIGNIFICANCE = 0.05
 # Share of the gains and losses in all blocks that has to be gains.
 CONSISTENT = 0.55
 # Share of the loads on which an effect has to be named again, at least, with that load left out.
@@ -80,8 +80,7 @@ class BenchSelection:
         self.fitter, self.rng = BenchFitter(self.problem), rng
         self.base = self.found = self.fitter.cross_validate(self.fitter.fit([]))
         self.names, self.unobservable = observable(problem)
-        self._search = BenchSearch(problem, self.fitter, self.names, settings.most_on_bench, jobs,
-                                   progress)
+        self._search = BenchSearch(problem, self.fitter, self.names, settings, jobs, progress)
         self.unstable: dict[str, str] = {}
         self.alone: list[Fit] = []
         self.sets: list[Fit] = []
@@ -121,9 +120,15 @@ class BenchSelection:
                                   for name, note in vague.items() if name not in self.found.names})
 
     def _most_probable(self, fits: Sequence[Fit]) -> Fit:
-        """Of those that predict loads held out alike, return the most probable by rows fitted."""
+        """
+        Of those that predict loads held out alike, return the most probable by rows fitted.
+
+        One with fewer effects that only some muscles have is among them unless it is sure to
+        predict them worse.
+        """
         best = min(fits, key=self.typical_error)
-        return max((fit for fit in fits if self._alike(fit, best)),
+        return max((fit for fit in fits if self._alike(fit, best)
+                    or not_universal(fit) < not_universal(best) and self._as_good(fit, best)),
                    key=lambda fit: self._fitted_log_odds(fit, self.base))
 
     def _alike(self, fit: Fit, best: Fit) -> bool:
@@ -226,17 +231,21 @@ class BenchSelection:
 
     def _take_simpler(self) -> bool:
         """Take a simpler effect for one that may as well be that, if it predicts loads as well."""
-        largest = (1.0 + self.settings.practical) * self.typical_error(self.found)
         for name in {effect.limit for effect in self.found.effects if effect.limit}:
             if name in (*self.found.names, *self.unstable):
                 continue
             for effect in self._in_limit(self.found, name):
                 simpler = self._with_instead(effect.id, name)
                 if (not simpler.implausible() and name not in self._notes(simpler)
-                        and self.typical_error(simpler) <= largest):
+                        and self._as_good(simpler, self.found)):
                     self._leave_out(effect.id, f'it may as well be {name}', simpler)
                     return True
         return False
+
+    def _as_good(self, fit: Fit, other: Fit) -> bool:
+        """Whether a fit may predict rows held out as well as another one."""
+        return self.problem.predicts_as_well(
+            fit.held_out, other.held_out, self.settings.practical)
 
     def _with_instead(self, name: str, other: str) -> Fit:
         """Return the set found with another effect in the place of one of its own."""

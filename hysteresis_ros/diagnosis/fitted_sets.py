@@ -12,6 +12,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.residual import heteroscedasticity_p_value
+from hysteresis_ros.diagnosis.significance import SIGNIFICANCE
 from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 # Of several effects each has to take this share off the first error, to be seen with the others.
 LEAST_SHARE = 0.015
-SIGNIFICANCE = 0.05
 # Probability with which the base model's own error is smaller than what is called adequate. Of 122
 # clean arms of six constitutive models one was called faulty at 95 %, as loads left out say more
 # than what the model is off by; 98 % loses 4 of 218 cases of a wire that nobody here wrote, and

@@ -9,8 +9,11 @@ All sets are tested together, because the family-wise error of the whole catalog
 import math
 
 import numpy as np
+from scipy import special    # its stats take a second to import
 
 DRAWS = 400
+# Probability of chance above which nothing is said to be shown.
+SIGNIFICANCE = 0.05
 
 
 def block_sums(values: np.ndarray, block: np.ndarray) -> np.ndarray:
@@ -135,6 +138,30 @@ def typical_rmse(squares: np.ndarray, small: float) -> np.ndarray:
         Between the least and the largest RMSE of the folds.
     """
     return np.sqrt(np.maximum(typical_error(squares, small) ** 2 - small ** 2, 0.0))
+
+
+def surely_larger(squares: np.ndarray, others: np.ndarray, small: float,
+                  level: float = SIGNIFICANCE) -> bool:
+    """
+    Whether errors are larger than others on the same folds, and that is hardly chance.
+
+    By a paired t-test of the logarithms of the RMSE, one-sided: of what is extrapolated from the
+    other folds a few may be off by far more than all others.
+
+    Parameters
+    ----------
+    squares, others : ndarray, shape (folds,)
+        Mean square error of each fold.
+    small : float
+        RMSE below which a fold's error does not matter.
+    level : float
+        Probability of chance, at most.
+    """
+    ratios = 0.5 * np.log((squares + small ** 2) / (others + small ** 2))
+    if len(ratios) < 2:
+        return False
+    error = np.std(ratios, ddof=1) / math.sqrt(len(ratios))
+    return bool(np.mean(ratios) > special.stdtrit(len(ratios) - 1, 1.0 - level) * error)
 
 
 def typical_gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
