@@ -124,11 +124,26 @@ def test_an_effect_that_rows_fitted_do_not_ask_for_needs_all_loads(
     alone = dataclasses.replace(alone, held_out=problem.measured + shares * (
         selection.base.held_out - problem.measured))
     monkeypatch.setattr(selection, '_parameters', lambda fit: len(fit.effects))
+    notes = {}
+    monkeypatch.setattr(selection, '_notes', lambda fit: notes)
+
+    def taken(fit):
+        monkeypatch.setattr(selection, 'found', both)
+        monkeypatch.setattr(selection, 'sets', [both, fit])
+        monkeypatch.setattr(selection, 'unstable', {})
+        return selection._take_fewer() and selection.found is fit
     assert selection.typical_error(alone) > 1.05 * selection.typical_error(both)
-    assert (selection._most_probable([both, alone]) is alone) == fewer
+    assert taken(alone) == fewer
+    reason = selection.unstable.get('fatigue', '')
+    assert ('against fewer effects it acts with a probability of 0.' in reason) == fewer
+    assert set(selection.unstable) <= {'fatigue'}
     # With as many effects it has to predict as well on average.
-    other = dataclasses.replace(alone, effects=both.effects)
-    assert selection._most_probable([both, other]) is both
+    assert not taken(dataclasses.replace(alone, effects=both.effects))
+    # What every loaded muscle has need not be determined.
+    notes['series_compliance'] = 'vague'
+    assert taken(alone) == fewer
+    notes['slack'] = 'vague'
+    assert not taken(alone)
 
 
 @pytest.mark.parametrize('worse, alike', [(1.2, True), (1.4, True), (2.5, False)])

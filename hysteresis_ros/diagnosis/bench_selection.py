@@ -102,7 +102,7 @@ class BenchSelection:
         if not self.sets:
             return
         self._choose()
-        while (self._leave_out_chance() or self._leave_out_unstable()
+        while (self._leave_out_chance() or self._take_fewer() or self._leave_out_unstable()
                or self._leave_out_undetermined() or self._take_simpler()):
             pass
 
@@ -120,15 +120,9 @@ class BenchSelection:
                                   for name, note in vague.items() if name not in self.found.names})
 
     def _most_probable(self, fits: Sequence[Fit]) -> Fit:
-        """
-        Of those that predict loads held out alike, return the most probable by rows fitted.
-
-        One with fewer effects that only some muscles have is among them unless it is sure to
-        predict them worse.
-        """
+        """Of those that predict loads held out alike, return the most probable by rows fitted."""
         best = min(fits, key=self.typical_error)
-        return max((fit for fit in fits if self._alike(fit, best)
-                    or not_universal(fit) < not_universal(best) and self._as_good(fit, best)),
+        return max((fit for fit in fits if self._alike(fit, best)),
                    key=lambda fit: self._fitted_log_odds(fit, self.base))
 
     def _alike(self, fit: Fit, best: Fit) -> bool:
@@ -198,6 +192,34 @@ class BenchSelection:
         name = max(doubts, key=lambda one: doubts[one][0])
         _, reason, smaller = doubts[name]
         self._leave_out(name, f'given the others {reason}', smaller)
+        return True
+
+    def _take_fewer(self) -> bool:
+        """
+        Take a set with fewer effects that only some muscles have, if it is more probable.
+
+        That is by the rows fitted, and by these and the rows held out together: of a few loads one
+        may be predicted better by chance.
+        """
+        fitted, both = {}, {}
+        for fit in self.sets:
+            # What every loaded muscle has is sought again later, whatever these rows determine.
+            if (not_universal(fit) < not_universal(self.found)
+                    and not set(self.unstable).intersection(fit.names)
+                    and all(catalogue()[name].universal for name in self._notes(fit))):
+                fitted[fit.names] = self._fitted_log_odds(fit, self.found)
+                both[fit.names] = fitted[fit.names] + self._log_odds(fit, self.found)
+        fewer = [fit for fit in self.sets
+                 if min(fitted.get(fit.names, 0.0), both.get(fit.names, 0.0)) > 0.0]
+        if not fewer:
+            return False
+        chosen = max(fewer, key=lambda fit: both[fit.names])
+        # Both odds are of the same question.
+        acts = 1.0 / (1.0 + math.exp(min(0.5 * both[chosen.names], 700.0)))
+        for effect in self.found.effects:
+            if effect.id not in chosen.names and not effect.universal:
+                self._leave_out(effect.id, 'against fewer effects it acts with a probability of '
+                                f'{acts:.2f}', chosen)
         return True
 
     def _leave_out_unstable(self) -> bool:
