@@ -10,7 +10,7 @@ import pytest
 from hidden_cases import bench_model, found_in
 from hysteresis_ros.diagnosis.arm_problem import ArmProblem
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.effects.change_point import changes_of_line
+from hysteresis_ros.effects.change_point import change_of_line
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Air, Conditions
 from hysteresis_ros.laboratory.linkage import Linkage
@@ -241,10 +241,10 @@ def test_a_fit_starts_where_the_residual_goes_another_way(row):
     residual = 0.2 + 0.1 * response + 0.002 * rng.standard_normal(120)
     residual[row:] += 0.1 * (response[row:] - 1.2)
     clock = 30.0 * np.arange(1.0, 121.0)
-    moment, = changes_of_line(residual, response, clock)
+    moment = change_of_line(residual, response, clock)
     # A row in which the two lines meet belongs to either.
     assert clock[row - 2] <= moment < clock[row + 1]
-    assert changes_of_line(residual[:5], response[:5], clock[:5]) == []
+    assert change_of_line(residual[:5], response[:5], clock[:5]) is None
     starts = effect_of(MODEL, 'overload').moments(residual, response, clock)
     assert any(start['t'] == moment and start['compliance'] == 0.0 for start in starts)
 

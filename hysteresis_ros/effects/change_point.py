@@ -42,8 +42,8 @@ def change_points(residual: np.ndarray, clock: np.ndarray) -> list[float]:
     return found
 
 
-def changes_of_line(residual: np.ndarray, response: np.ndarray, clock: np.ndarray
-                    ) -> list[float]:
+def change_of_line(residual: np.ndarray, response: np.ndarray, clock: np.ndarray
+                   ) -> float | None:
     """
     Return the moment [s] from which a residual goes with the response in another way.
 
@@ -58,17 +58,17 @@ def changes_of_line(residual: np.ndarray, response: np.ndarray, clock: np.ndarra
 
     Returns
     -------
-    list of float
-        One moment shortly before the first row after the change; none where rows are too few.
+    float or None
+        Shortly before the first row after the change; None where there are too few rows.
     """
     count = len(residual)
     margin = _margin(count)
     if count < 2 * margin + 1:
-        return []
+        return None
     before = np.arange(margin, count - margin + 1)
     squares = (_about_lines(residual, response)[before - 1]
                + _about_lines(residual[::-1], response[::-1])[count - before - 1])
-    return [_shortly_before(clock, int(before[np.argmin(squares)]))]
+    return _shortly_before(clock, int(before[np.argmin(squares)]))
 
 
 def _about_lines(residual: np.ndarray, response: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings
-from hysteresis_ros.effects.change_point import change_points, changes_of_line, NEVER
+from hysteresis_ros.effects.change_point import change_of_line, change_points, NEVER
 from hysteresis_ros.effects.stages import MaterialEffect
 
 
@@ -76,9 +76,9 @@ class Overload(MaterialEffect):
     def moments(self, residual: np.ndarray, response: np.ndarray, clock: np.ndarray
                 ) -> list[dict[str, float]]:
         """Return losses of stroke at moments from which the residual goes another way."""
+        times = [change_of_line(residual, response, clock), *change_points(residual, clock)]
         return [{'compliance': 0.0, 'lost': self.TYPICAL, 't': time}
-                for time in {*changes_of_line(residual, response, clock),
-                             *change_points(residual, clock)}]
+                for time in dict.fromkeys(times) if time is not None]
 
     def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,
               surroundings: Surroundings) -> tuple[np.ndarray, np.ndarray]:
