@@ -137,13 +137,56 @@ def test_an_effect_that_rows_fitted_do_not_ask_for_needs_all_loads(
     reason = selection.unstable.get('fatigue', '')
     assert ('against fewer effects it acts with a probability of 0.' in reason) == fewer
     assert set(selection.unstable) <= {'fatigue'}
-    # With as many effects it has to predict as well on average.
-    assert not taken(dataclasses.replace(alone, effects=both.effects))
+    assert fewer == (0.0 < float(reason[reason.find('of 0.') + 3:][:4] or 0.0) < 0.5)
     # What every loaded muscle has need not be determined.
     notes['series_compliance'] = 'vague'
     assert taken(alone) == fewer
     notes['slack'] = 'vague'
     assert not taken(alone)
+
+
+def test_fewer_effects_are_not_taken_for_anything_else(selection, monkeypatch):
+    measured = selection.problem.measured
+    both = of_share(selection, ('slack', 'stress_dependence', 'fatigue'), 0.3, 0.3)
+    alone = of_share(selection, ('slack',), 0.3, 0.3)
+    better = of_share(selection, ('fatigue',), 0.3, 0.25)
+    monkeypatch.setattr(selection, '_parameters', lambda fit: len(fit.effects))
+    monkeypatch.setattr(selection, '_notes', lambda fit: {})
+    monkeypatch.setattr(selection, 'found', both)
+
+    def taken(*fits, unstable=()):
+        monkeypatch.setattr(selection, 'found', both)
+        monkeypatch.setattr(selection, 'sets', [both, *fits])
+        monkeypatch.setattr(selection, 'unstable', dict.fromkeys(unstable, 'not named again'))
+        return selection.found if selection._take_fewer() else None
+    taken(alone, better)
+    assert selection.found is better
+    # What every loaded muscle has is sought again, the other one is not.
+    assert list(selection.unstable) == ['slack']
+    taken(better, alone, unstable=['fatigue'])
+    assert selection.found is alone
+    # As many effects, or rows held out alone that speak for fewer.
+    assert taken(dataclasses.replace(better, effects=both.effects)) is None
+    held_out = dataclasses.replace(alone, held_out=measured, predicted=measured + 0.6 * (
+        selection.base.predicted - measured))
+    assert selection._log_odds(held_out, both) + selection._fitted_log_odds(held_out, both) > 0.0
+    assert taken(held_out) is None
+
+
+def test_fewer_effects_are_taken_on_the_way(selection, monkeypatch):
+    fits = [of_share(selection, names, 0.3, 0.3) for names in (('slack', 'fatigue'), ('slack',))]
+    fits[1] = dataclasses.replace(fits[1], held_out=fits[1].held_out + 0.1 * (
+        fits[1].held_out - selection.problem.measured))
+    for name, value in (('_judge', lambda *_: fits), ('_notes', lambda fit: {}), ('sets', []),
+                        ('_significance', lambda some, base: np.zeros(len(some))),
+                        ('_parameters', lambda fit: len(fit.effects)), ('unstable', {}),
+                        ('_leave_out_chance', lambda: False), ('tried', []), ('alone', []),
+                        ('_most_probable', lambda some: fits[0]), ('p_values', {}),
+                        ('found', selection.base), ('_named_again', lambda other: 1.0)):
+        monkeypatch.setattr(selection, name, value)
+    monkeypatch.setattr(selection._search, 'run', lambda: ([], []))
+    selection.run()
+    assert selection.found is fits[1] and list(selection.unstable) == ['fatigue']
 
 
 @pytest.mark.parametrize('worse, alike', [(1.2, True), (1.4, True), (2.5, False)])

@@ -9,6 +9,7 @@ import pytest
 
 from hidden_cases import bench_model, found_in
 from hysteresis_ros.diagnosis.arm_problem import ArmProblem
+from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.effects.change_point import change_of_line
 from hysteresis_ros.laboratory.arm import Arm
@@ -231,6 +232,14 @@ def test_a_loss_of_stroke_is_undone_by_no_controller_and_shown_by_the_observer()
     asked = MODEL.geometry.reference(2.0)
     np.testing.assert_allclose(*(one.controller().setpoint(asked.length, asked.force)[0]
                                  for one in (model, MODEL)))
+
+
+@pytest.mark.parametrize('low, said', [(0.005, 'overload.lost'), (0.02, None)])
+def test_a_loss_of_stroke_is_determined_where_it_is_not_too_small_to_matter(low, said):
+    effect = effect_of(MODEL, 'overload', compliance=0.0, lost=0.03, t=75.0)
+    effect.intervals['lost'] = low, 0.05
+    note = not_determined(effect, 'arm')
+    assert note is None if said is None else said in note
 
 
 @pytest.mark.parametrize('row', [4, 30, 100])

@@ -78,6 +78,17 @@ def test_each_set_begins_at_others_and_keeps_its_place(search):
     assert [fit.effects[-1].C for fit in found] == [0.38] * 3
 
 
+def test_a_search_begins_at_other_shifts(search, monkeypatch):
+    own = search(Fitter({0.43: 2.0, 0.38: 1.0}))
+    fit = own.fitter.fit([catalogue()['stress_dependence'](C=0.43)])
+    monkeypatch.setattr(own, '_grown', lambda: [])
+    monkeypatch.setattr(own, '_begun_where_larger_ended', lambda fits: [fit])
+    monkeypatch.setattr(own, '_in_other_forms', list)
+    monkeypatch.setattr(own, '_in_simplest_forms', lambda fits: [])
+    for fits in own.run():
+        assert [one.effects[0].C for one in fits] == [0.38]
+
+
 def test_without_a_shift_nothing_is_begun():
     assert at_other_shifts([catalogue()['slack'](Ls=1.0)]) == []
 

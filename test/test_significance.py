@@ -69,7 +69,9 @@ def test_schwarz_odds_are_those_of_hand_and_find_the_true_number_of_parameters()
 
 @pytest.mark.parametrize('ratios, surely', [
     ((1.2, 1.25, 1.3, 1.2), True), ((1.0, 1.0, 1.0, 2.0), False), ((0.9, 1.1, 1.2, 1.0), False),
-    ((0.8, 0.75, 0.8, 0.85), False), ((1.5,), False), ((1.001, 1.0011, 1.0009, 1.001), True)])
+    ((0.8, 0.75, 0.8, 0.85), False), ((1.5,), False), ((1.001, 1.0011, 1.0009, 1.001), True),
+    # Only with too small a spread of four.
+    ((1.0, 1.1, 1.2, 1.05), False)])
 def test_errors_are_surely_larger_where_chance_over_the_folds_is_not_enough(ratios, surely):
     """As scipy's paired t-test of the logarithms says, one-sided."""
     squares = np.array(ratios) ** 2
