@@ -113,7 +113,8 @@ def test_a_single_load_that_others_are_extrapolated_to_does_not_decide(
 
 
 @pytest.mark.parametrize('most, last, fitted, fewer', [
-    (0.3, 0.6, 0.3, True), (0.45, 0.45, 0.3, False), (0.3, 0.6, 0.6, False)])
+    (0.3, 0.5, 0.3, True), (0.32, 0.33, 0.3, False), (0.3, 3.0, 0.3, False),
+    (0.3, 0.5, 0.6, False)])
 def test_an_effect_that_rows_fitted_do_not_ask_for_needs_all_loads(
         selection, monkeypatch, most, last, fitted, fewer):
     """One of the loads that are held out may be predicted better by chance."""
@@ -124,8 +125,7 @@ def test_an_effect_that_rows_fitted_do_not_ask_for_needs_all_loads(
     alone = dataclasses.replace(alone, held_out=problem.measured + shares * (
         selection.base.held_out - problem.measured))
     monkeypatch.setattr(selection, '_parameters', lambda fit: len(fit.effects))
-    notes = {}
-    monkeypatch.setattr(selection, '_notes', lambda fit: notes)
+    monkeypatch.setattr(selection, '_determines', lambda fit: True)
 
     def taken(fit):
         monkeypatch.setattr(selection, 'found', both)
@@ -138,10 +138,7 @@ def test_an_effect_that_rows_fitted_do_not_ask_for_needs_all_loads(
     assert ('against fewer effects it acts with a probability of 0.' in reason) == fewer
     assert set(selection.unstable) <= {'fatigue'}
     assert fewer == (0.0 < float(reason[reason.find('of 0.') + 3:][:4] or 0.0) < 0.5)
-    # What every loaded muscle has need not be determined.
-    notes['series_compliance'] = 'vague'
-    assert taken(alone) == fewer
-    notes['slack'] = 'vague'
+    monkeypatch.setattr(selection, '_determines', lambda fit: False)
     assert not taken(alone)
 
 
@@ -151,7 +148,7 @@ def test_fewer_effects_are_not_taken_for_anything_else(selection, monkeypatch):
     alone = of_share(selection, ('slack',), 0.3, 0.3)
     better = of_share(selection, ('fatigue',), 0.3, 0.25)
     monkeypatch.setattr(selection, '_parameters', lambda fit: len(fit.effects))
-    monkeypatch.setattr(selection, '_notes', lambda fit: {})
+    monkeypatch.setattr(selection, '_determines', lambda fit: True)
     monkeypatch.setattr(selection, 'found', both)
 
     def taken(*fits, unstable=()):
@@ -175,7 +172,8 @@ def test_fewer_effects_are_not_taken_for_anything_else(selection, monkeypatch):
 
 def test_fewer_effects_are_taken_on_the_way(selection, monkeypatch):
     fits = [of_share(selection, names, 0.3, 0.3) for names in (('slack', 'fatigue'), ('slack',))]
-    fits[1] = dataclasses.replace(fits[1], held_out=fits[1].held_out + 0.1 * (
+    last = selection.problem.fold == selection.problem.folds[-1]
+    fits[1] = dataclasses.replace(fits[1], held_out=fits[1].held_out + 0.5 * last * (
         fits[1].held_out - selection.problem.measured))
     for name, value in (('_judge', lambda *_: fits), ('_notes', lambda fit: {}), ('sets', []),
                         ('_significance', lambda some, base: np.zeros(len(some))),

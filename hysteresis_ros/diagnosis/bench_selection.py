@@ -198,22 +198,21 @@ class BenchSelection:
         """
         Take a set with fewer effects that only some muscles have, if it is more probable.
 
-        That is by the rows fitted, and by these and the rows held out together: of a few loads one
-        may be predicted better by chance.
+        That is by the rows fitted, and by these and the rows held out together, and it is not sure
+        to predict these worse: of a few loads one may be predicted better by chance.
         """
-        fitted, both = {}, {}
+        both: dict[tuple[str, ...], float] = {}
         for fit in self.sets:
-            # What every loaded muscle has is sought again later, whatever these rows determine.
-            if (not_universal(fit) < not_universal(self.found)
+            if (not_universal(fit) < not_universal(self.found) and self._determines(fit)
                     and not set(self.unstable).intersection(fit.names)
-                    and all(catalogue()[name].universal for name in self._notes(fit))):
-                fitted[fit.names] = self._fitted_log_odds(fit, self.found)
-                both[fit.names] = fitted[fit.names] + self._log_odds(fit, self.found)
-        fewer = [fit for fit in self.sets
-                 if min(fitted.get(fit.names, 0.0), both.get(fit.names, 0.0)) > 0.0]
-        if not fewer:
+                    and self._as_good(fit, self.found)):
+                fitted = self._fitted_log_odds(fit, self.found)
+                if min(fitted, fitted + self._log_odds(fit, self.found)) > 0.0:
+                    both[fit.names] = fitted + self._log_odds(fit, self.found)
+        if not both:
             return False
-        chosen = max(fewer, key=lambda fit: both[fit.names])
+        chosen = max((fit for fit in self.sets if fit.names in both),
+                     key=lambda fit: both[fit.names])
         # Both odds are of the same question.
         acts = 1.0 / (1.0 + math.exp(min(0.5 * both[chosen.names], 700.0)))
         for effect in self.found.effects:
