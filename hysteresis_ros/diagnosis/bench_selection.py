@@ -201,20 +201,20 @@ class BenchSelection:
         That is by the rows fitted, and by these and the rows held out together, and it is not sure
         to predict these worse: of a few loads one may be predicted better by chance.
         """
-        both: dict[tuple[str, ...], float] = {}
+        fewer = []
         for fit in self.sets:
             if (not_universal(fit) < not_universal(self.found) and self._determines(fit)
                     and not set(self.unstable).intersection(fit.names)
                     and self._as_good(fit, self.found)):
                 fitted = self._fitted_log_odds(fit, self.found)
-                if min(fitted, fitted + self._log_odds(fit, self.found)) > 0.0:
-                    both[fit.names] = fitted + self._log_odds(fit, self.found)
-        if not both:
+                together = fitted + self._log_odds(fit, self.found)
+                if min(fitted, together) > 0.0:
+                    fewer.append((together, fit))
+        if not fewer:
             return False
-        chosen = max((fit for fit in self.sets if fit.names in both),
-                     key=lambda fit: both[fit.names])
+        together, chosen = max(fewer, key=lambda one: one[0])
         # Both odds are of the same question.
-        acts = 1.0 / (1.0 + math.exp(min(0.5 * both[chosen.names], 700.0)))
+        acts = 1.0 / (1.0 + math.exp(min(0.5 * together, 700.0)))
         for effect in self.found.effects:
             if effect.id not in chosen.names and not effect.universal:
                 self._leave_out(effect.id, 'against fewer effects it acts with a probability of '
