@@ -101,7 +101,7 @@ RANGES = {
     ('coulomb_friction', 'tau_c'): ('N m', 0.001, 0.150),
     ('cable_friction', 'mu_phi'): ('1', 0.005, 1.0),
     ('overload', 'Fy'): ('loads', 0.2, 5.0), ('overload', 'compliance'): ('mm/N', 0.1, 20.0),
-    ('overload', 'lost'): ('1', 0.01, 0.9), ('overload', 't'): ('s', 1.0, 1e5),
+    ('overload', 'lost'): ('1', 0.03, 0.9), ('overload', 't'): ('s', 1.0, 1e5),
     ('wire_break', 'time'): ('s', 1.0, 1e5),
     ('viscous_friction', 'b'): ('N m s/rad', 0.001, 4.0), ('payload_error', 'dm'): ('g', 1., 100.),
     # A clamp of 50 g, too: the base model's own error alone may look like 10 g.

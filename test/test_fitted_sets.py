@@ -13,6 +13,7 @@ from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.effects import catalogue
 
 NAMES = frozenset(['payload_error'])
 
@@ -158,7 +159,7 @@ def test_a_set_has_to_explain_more_than_fewer_effects_that_suffice(
     """Whether or not they are among its own."""
     one, two = frozenset(['encoder_offset']), frozenset(['geometry_error', 'supply_limit'])
     errors = {one: own, two: 0.2}
-    always = types.SimpleNamespace(implausible=list)
+    always = types.SimpleNamespace(implausible=list, effects=[])
     for name, value in (
             ('fits', dict.fromkeys(errors, always)), ('ranked', lambda: [two, one]),
             ('p_values', {'encoder_offset': 0.01}), ('own_error', errors.get),
@@ -175,3 +176,17 @@ def test_a_set_has_to_explain_more_than_fewer_effects_that_suffice(
     monkeypatch.setitem(errors, none, 0.7)
     monkeypatch.setitem(sets.fits, none, always)
     assert sets.valid() == [two, none]
+
+
+@pytest.mark.parametrize('low, valid', [(0.02, False), (0.04, True)])
+def test_the_size_of_a_form_has_to_be_determined(sets, monkeypatch, low, valid):
+    """A muscle that is only longer from a moment on has lost no stroke then."""
+    lost, yields = (catalogue()['overload'](**values) for values in (
+        {'lost': 0.06, 't': 75.0}, {'Fy': 1.0, 'compliance': 3.0}))
+    lost.intervals['lost'] = low, 0.08
+    fits = {frozenset([name]): types.SimpleNamespace(effects=[effect])
+            for name, effect in (('lost', lost), ('yields', yields))}
+    monkeypatch.setattr(sets, 'fits', fits)
+    monkeypatch.setattr(sets.fitter, 'with_intervals', lambda fit: fit.effects)
+    assert sets._form_in_doubt(frozenset(['lost'])) != valid
+    assert not sets._form_in_doubt(frozenset(['yields']))

@@ -11,6 +11,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
+from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.residual import heteroscedasticity_p_value
 from hysteresis_ros.diagnosis.significance import SIGNIFICANCE
 from hysteresis_ros.workers import map_in_forks
@@ -275,7 +276,8 @@ class FittedSets:
         """
         Return the sets that may be the answer, most probable first.
 
-        All values are physical, and each effect matters: without it the error is larger by a
+        All values are physical, the size of a form that was chosen is determined, and each effect
+        matters: without it the error is larger by a
         practical size, and by more than the expected error of the base model; or, as that repeats
         itself with the drive, it remembers something of its own, and the set is clearly less
         probable without it. And without it the error is larger than the base model's own could be,
@@ -284,13 +286,22 @@ class FittedSets:
         the base model's error and that of an effect's equation could be; and no set of fewer
         effects suffices with a residual that is as small but for the base model's error.
         """
-        physical = [names for names in self.ranked() if not self.fits[names].implausible()]
+        physical = [names for names in self.ranked() if not self.fits[names].implausible()
+                    and not self._form_in_doubt(names)]
         valid = [names for names in physical if self._each_matters(names)
                  and (len(names) != 1 or self.p_values.get(next(iter(names)), 1.0) <= SIGNIFICANCE)
                  and not self._surpassed(names, physical)]
         return [names for names in valid if not any(
             0 < len(fewer) < len(names) and self.sufficient(fewer)
             and self._hardly_better(names, fewer) for fewer in valid)]
+
+    def _form_in_doubt(self, names: frozenset[str]) -> bool:
+        """Whether an effect of a set has a form whose size the rows do not determine."""
+        fit = self.fits[names]
+        if not any(effect.size_parameter.form for effect in fit.effects):
+            return False
+        return any(effect.size_parameter.form and not_determined(effect, self.problem.kind)
+                   for effect in self.fitter.with_intervals(fit))
 
     def _each_matters(self, names: frozenset[str]) -> bool:
         error = self.own_error(names)

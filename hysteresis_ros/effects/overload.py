@@ -22,7 +22,7 @@ class Overload(MaterialEffect):
 
     What was overheated, or overloaded while it was hot, has also lost a share of its stroke. That
     need not have been the largest drive or load so far: it happened at a moment, which counts in
-    each recording from its own start.
+    each recording from its own start. What is only longer from a moment on may have slipped.
     """
 
     id = 'overload'
@@ -47,8 +47,8 @@ class Overload(MaterialEffect):
         # Of 0.2 mm and 0.27 m with a hardening modulus of 0.4 to 80 GPa.
         Parameter('compliance', 'mm/N', 'residual elongation per load beyond, 1 / K', 0.1, 20.0,
                   0.0, (1.5, 6.0), log=True, scale='compliance', form=True),
-        # A transformation that is all lost drives nothing any more.
-        Parameter('lost', '1', 'share of the stroke that is lost from t on', 0.01, 0.9, 0.0, (0.0,),
+        # Less than a model of the arm is off by is none; and what has lost all drives nothing.
+        Parameter('lost', '1', 'share of the stroke that is lost from t on', 0.03, 0.9, 0.0, (0.0,),
                   kinds=('arm',), limits=(0.0, 1.0), form=True),
         Parameter('e', '% of l0', 'residual strain from t on, negative where the cold muscle stays '
                   'shorter', 0.0, 6.0, 0.0, (0.0,), both_signs=True, kinds=('arm',),
@@ -83,5 +83,6 @@ class Overload(MaterialEffect):
     def drift(self, drive: np.ndarray, drive_squared: np.ndarray, inputs: Inputs,
               surroundings: Surroundings) -> tuple[np.ndarray, np.ndarray]:
         """Return the residual strain, and the stroke that is left, of a whole trial."""
-        after = np.where(np.asarray(inputs.clock) >= self.t, 1.0, 0.0) + 0.0 * drive
+        from_then_on = np.asarray(inputs.clock) >= (self.t if self.lost else math.inf)
+        after = np.where(from_then_on, 1.0, 0.0) + 0.0 * drive
         return self.e / 100.0 * surroundings.length * after, 1.0 - self.lost * after
