@@ -9,6 +9,7 @@ from model_support import bicep_model, effect_of, runs
 import numpy as np
 import pytest
 
+from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.selection import Selection
@@ -184,9 +185,19 @@ def test_the_size_of_a_form_has_to_be_determined(sets, monkeypatch, low, valid):
     lost, yields = (catalogue()['overload'](**values) for values in (
         {'lost': 0.06, 't': 75.0}, {'Fy': 1.0, 'compliance': 3.0}))
     lost.intervals['lost'] = low, 0.08
-    fits = {frozenset([name]): types.SimpleNamespace(effects=[effect])
-            for name, effect in (('lost', lost), ('yields', yields))}
-    monkeypatch.setattr(sets, 'fits', fits)
+    # Of another effect only what it explains counts.
+    offset = catalogue()['encoder_offset'](offset=1.0)
+    for effect in (offset, yields):
+        size = effect.parameters[0]
+        effect.intervals[size.name] = -size.high if size.both_signs else 0.0, size.high
+        assert not_determined(effect, 'arm')
+    names = [frozenset([name]) for name in ('lost', 'yields')]
+    for name, value in (
+            ('fits', {one: types.SimpleNamespace(effects=effects, implausible=list)
+                      for one, effects in zip(names, ([lost, offset], [yields]))}),
+            ('ranked', lambda: names), ('_each_matters', lambda names: True),
+            ('_surpassed', lambda names, others: False)):
+        monkeypatch.setattr(sets, name, value)
     monkeypatch.setattr(sets.fitter, 'with_intervals', lambda fit: fit.effects)
-    assert sets._form_in_doubt(frozenset(['lost'])) != valid
-    assert not sets._form_in_doubt(frozenset(['yields']))
+    monkeypatch.setattr(sets, 'p_values', {'lost': 0.01, 'yields': 0.01})
+    assert sets.valid() == (names if valid else names[1:])
