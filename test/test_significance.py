@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """How likely chance explains as much, against its definition."""
 
+from model_support import autoregressive
 import numpy as np
 import pytest
 from scipy import stats
 
 from hysteresis_ros.diagnosis.significance import (
-    block_sums, cosines, gain_interval, paired_p_values, residualise, schwarz_log_odds,
-    surely_larger)
+    block_sums, cosines, gain_interval, independent_rows, paired_p_values, residualise,
+    schwarz_log_odds, surely_larger)
 
 
 def test_paired_p_values_tell_a_steady_gain_from_one_lucky_block():
@@ -82,3 +83,20 @@ def test_errors_are_surely_larger_where_chance_over_the_folds_is_not_enough(rati
         assert (test.pvalue < 0.05) == surely
     # Errors that are too small to matter are alike.
     assert not surely_larger(4.0 * squares, others, 1e9)
+
+
+@pytest.mark.parametrize('rho', [0.0, 0.5, 0.9])
+def test_rows_that_follow_each_other_tell_less(rho):
+    trials, rows = 20, 200
+    residual = autoregressive(np.random.default_rng(3), trials, rows, rho)
+    trial = np.repeat(np.arange(trials), rows)
+    found = independent_rows(residual, trial, 10)
+    assert found == pytest.approx(trials * rows * (1.0 - rho) / (1.0 + rho), rel=0.1)
+    assert independent_rows(residual, trial, 3900) >= 3900.0
+
+
+def test_rows_of_different_trials_do_not_follow_each_other():
+    jump = np.repeat([1.0, -1.0], 2)
+    assert independent_rows(jump, np.arange(4), 1) == 4.0
+    assert independent_rows(np.zeros(6), np.zeros(6), 1) == 6.0
+    assert independent_rows(np.tile([1.0, -1.0], 9), np.zeros(18), 1) == 18.0

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 AUTO = ('--effects auto: each effect that a bench can show is fitted to the length table, alone\n'
         'and in sets; what predicts held-out trials clearly better is kept, and what every\n'
-        'loaded muscle has where it does no harm; kinetics of minor loops, where held-out loads\n'
-        'show them.\n')
+        'loaded muscle has where it does no harm; kinetics of minor loops, where a row left\n'
+        'out is predicted better with them.\n')
 NOTHING = ('No effect: with none are trials that were left out predicted clearly better. What\n'
            'each would do says `hysteresis diagnose` of the length table.')
 OPERATORS = ('two-stage', 'preisach', 'play', 'bouc-wen', 'linear')

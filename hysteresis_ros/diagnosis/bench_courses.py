@@ -121,9 +121,8 @@ class BenchCourses:
                 drifts.append(chain.drift(trial.drive, squared, inputs))
         offset, factor = np.concatenate(drifts, axis=1) if drifts else (0.0, 1.0)
         scales, known = chain.scale(load) * factor + 0.0 * load, chain.stretch(load) + offset
-        if feedback is not None and feedback.kinetics is not None:
-            known = known + chain.kinetics * scales * feedback.kinetics
-        return Course(self._excitation(chain, np.concatenate(driven)), scales, known)
+        return Course(self._excitation(chain, np.concatenate(driven)), scales, known,
+                      chain.kinetics)
 
     def _excitation(self, chain: Chain, squared: np.ndarray) -> Excitation:
         """Return what H2 is given for the drive squared of all trials, shape (rows + trials,)."""

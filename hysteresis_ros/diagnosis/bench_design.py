@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from hysteresis_ros.identification.grid import nodes_along
+from hysteresis_ros.identification.kinetic_weights import KineticWeights, Tangent
 from hysteresis_ros.identification.smoothness import smoothness_square
 from hysteresis_ros.kernels.shares import shares
 from hysteresis_ros.operators import cell_areas, Preisach
@@ -95,6 +96,12 @@ class Excitation:
         found[:, -1] = 1.0
         return found
 
+    def kinetic(self, levels: int, top: float) -> KineticWeights:
+        """Return what kinetics add to the response where all has transformed at an input."""
+        plain = self.shares(levels, np.ones(len(self._response)))
+        return KineticWeights(
+            self.nodes(levels), self.inputs, self._ends, self._wanted, plain, top)
+
 
 @dataclasses.dataclass
 class Feedback:
@@ -105,13 +112,13 @@ class Feedback:
     ----------
     phases : list of ndarray or None
         Martensite share in every row of each trial; None where no effect depends on it.
-    kinetics : ndarray, shape (rows,), or None
-        What its output would change by if all of the wire followed the kinetics of `Kinetics`; None
-        where none of it does.
+    kinetics : Tangent or None
+        What its output in judged rows would change by if all of the wire followed the kinetics of
+        `Kinetics`, near those weights; None where none of it does.
     """
 
     phases: list[np.ndarray] | None
-    kinetics: np.ndarray | None
+    kinetics: Tangent | None
 
 
 @dataclasses.dataclass
@@ -119,12 +126,14 @@ class Course:
     """
     What H2 is given, trial after trial, and what is done to its output.
 
-    `scales` and `known` (rows,) multiply the output above its least and are added to it.
+    `scales` and `known` (rows,) multiply the output above its least and are added to it; a share
+    `kinetics` of it follows those of `Kinetics`.
     """
 
     excitation: Excitation
     scales: np.ndarray
     known: np.ndarray
+    kinetics: float
 
 
 @dataclasses.dataclass

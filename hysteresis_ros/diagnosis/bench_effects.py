@@ -135,8 +135,7 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     if ThermalExpansion.id not in excluded:
         known = with_expansion(BenchFitter(problem.finer()), known, Settings().practical)
     if Kinetics.id not in excluded:
-        shown = shown_kinetics(BenchFitter(problem.finer()), known, Settings().practical,
-                               np.random.default_rng(0))
+        shown = shown_kinetics(BenchFitter(problem.finer()), known)
         known = shown.effects if shown else known
     if not known:
         return model, []

@@ -66,10 +66,12 @@ class Response:
         if len(start) == 0:
             return start
         mean, pull = self._known_beforehand(start)
+        emphasis = self.problem.emphasis
         return minimise(
-            lambda vector: np.append((self.predicted(vector) - self.problem.measured)[
+            lambda vector: np.append((emphasis * (self.predicted(vector) - self.problem.measured))[
                 self._fitted] / self._scale, pull @ (vector - mean)),
-            lambda vector: np.vstack((self.jacobian(vector)[self._fitted] / self._scale, pull)),
+            lambda vector: np.vstack(((emphasis[:, None] * self.jacobian(vector))[
+                self._fitted] / self._scale, pull)),
             start, self.parameters.lower, self.parameters.upper, evaluations, tolerance)
 
     def _known_beforehand(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

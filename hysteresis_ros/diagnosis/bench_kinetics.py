@@ -1,12 +1,13 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether loads held out on a bench show minor loops that do not close (`effects.kinetics`).
+Whether the rows of a bench show minor loops that do not close (`effects.kinetics`).
 
-The weights of H2 follow the minor loops of the loads that they are fitted to, whatever these are.
-They cannot do so for a load that they have not seen, and what is predicted there tells the kinetics
-of the wire. They are sought once the other effects are known, because each wire has kinetics and no
-other effect stands for them.
+The weights of H2 follow the minor loops that they are fitted to one by one, whatever these are. A
+wire whose minor loops are scaled from the major one needs fewer of them for the same rows, and one
+whose loops close is fitted far worse. What a row left out would be off by tells both: generalised
+cross-validation (Golub, Heath and Wahba, Technometrics 21 (1979) 215). Kinetics are sought once the
+other effects are known, because each wire has kinetics and no other effect stands for them.
 """
 
 from __future__ import annotations
@@ -15,37 +16,41 @@ from collections.abc import Sequence
 import dataclasses
 
 import numpy as np
+from scipy import special
 
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.determined import not_determined
-from hysteresis_ros.diagnosis.significance import typical_gain_interval
+from hysteresis_ros.diagnosis.significance import (
+    independent_rows, schwarz_log_odds, SIGNIFICANCE)
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.measurements.turns import turns
+
+# Shares that are tried first, and those that are tried too where one of them is better than none.
+COARSE, FINE = (0.25, 0.5, 0.75, 1.0), (0.125, 0.375, 0.625, 0.875)
 
 
 @dataclasses.dataclass
 class BenchKinetics:
     """
-    What the loads of a bench show with kinetics.
+    What the rows of a bench show with kinetics.
 
     Attributes
     ----------
     effects : list of Effect
-        Those found before and, last, `Kinetics`, fitted together, with intervals.
-    before, after : Fit
-        Cross-validated.
+        Those found before and, last, `Kinetics`, with intervals.
+    before, after : float
+        RMSE of a row left out without and with kinetics, in the unit of the response.
     """
 
     effects: list[Effect]
-    before: Fit
-    after: Fit
+    before: float
+    after: float
 
 
-def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: float,
-                   rng: np.random.Generator) -> BenchKinetics | None:
+def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetics | None:
     """
     Return the effects found on a bench with the kinetics of the wire.
 
@@ -55,15 +60,12 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
         Rows, and a model without the effects.
     found : sequence of Effect
         Effects with values.
-    practical : float
-        Share by which the typical RMSE of loads held out has to fall for sure.
-    rng : numpy.random.Generator
 
     Returns
     -------
     BenchKinetics or None
-        None where there are no minor loops, the rows do not determine the share, or loads held
-        out are not sure to be predicted better by what matters.
+        None where there are no minor loops, a row left out is predicted no better than by chance
+        (Schwarz's criterion), or the share is not determined.
     """
     problem = fitter.problem
     surroundings = problem.model.surroundings
@@ -72,26 +74,95 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], practical: floa
             or not _has_minor_loops(problem)):
         return None
     with np.errstate(all='ignore'):
-        own = fitter
-        after = own.search(found, Kinetics(surroundings))
-        effects = _with_intervals(own, after)
-        # What loads held out have determined is not refitted to rows that do not determine it.
-        fixed = [one for one, fitted in zip(found, effects) if not_determined(fitted, problem.kind)]
-        if fixed:
-            own = fitter.apart()
-            own.fixed = [*fitter.fixed, *fixed]
-            after = own.search([one for one in found if one not in fixed], Kinetics(surroundings))
-            effects = _with_intervals(own, after)
-        if not effects or after.implausible() or any(
-                not_determined(effect, problem.kind) for effect in effects):
+        profile = _Profile(fitter, found)
+        profile.evaluate(COARSE)
+        if profile.best == 0.0:
             return None
-        before, after = fitter.cross_validate(fitter.fit(found)), own.cross_validate(after)
-    # What is little on a bench, which goes through each minor loop once, may be much on an arm.
-    gain, _ = typical_gain_interval(
-        problem.measured - before.held_out, problem.measured - after.held_out, problem.block,
-        problem.fold, problem.noise, rng)
-    # A comparison that NaN does not pass.
-    return BenchKinetics([*fixed, *effects], before, after) if gain >= practical else None
+        profile.evaluate(FINE)
+        if not profile.proves():
+            return None
+        kinetics = Kinetics(surroundings, share=profile.best)
+        kinetics.intervals['share'] = profile.interval()
+        own = profile.fitter_with(profile.best)
+        fit = profile.fits[profile.best]
+        effects = own.with_intervals(fit)
+        # What loads held out have determined is not refitted to rows that do not determine it.
+        vague = [one for one, fitted in zip(found, effects) if not_determined(fitted, problem.kind)]
+        if vague:
+            own.fixed = [*own.fixed, *vague]
+            fit = own.fit([one for one in fit.effects
+                           if one.id not in {effect.id for effect in vague}])
+            effects = own.with_intervals(fit)
+        if fit.implausible() or any(not_determined(effect, problem.kind)
+                                    for effect in (*effects, kinetics)):
+            return None
+    return BenchKinetics([*vague, *effects, kinetics], profile.errors[0.0],
+                         profile.errors[profile.best])
+
+
+class _Profile:
+    """
+    RMSE of a row left out by the share that follows the kinetics, all else fitted to each.
+
+    Attributes
+    ----------
+    errors : dict of float to float
+    fits : dict of float to Fit
+    """
+
+    def __init__(self, fitter: BenchFitter, found: Sequence[Effect]) -> None:
+        self._fitter, self._found = fitter, found
+        self.errors: dict[float, float] = {}
+        self.fits: dict[float, Fit] = {}
+        self.evaluate((0.0,))
+        problem = fitter.problem
+        self._rows = independent_rows(
+            problem.measured - self.fits[0.0].predicted, problem.trial,
+            len(np.unique(problem.block)))
+
+    @property
+    def best(self) -> float:
+        """Share with the least error."""
+        return min(self.errors, key=lambda share: self.errors[share])
+
+    def fitter_with(self, share: float) -> BenchFitter:
+        """Return the fitter with kinetics of a share."""
+        own = self._fitter.apart()
+        if share:
+            own.fixed = [*own.fixed, Kinetics(own.problem.model.surroundings, share=share)]
+        return own
+
+    def evaluate(self, shares: Sequence[float]) -> None:
+        """Fit the effects with some shares."""
+        for share in shares:
+            near = min(self.fits, key=lambda one: abs(one - share), default=None)
+            starts = [self._found]
+            if near is not None:
+                starts.append(self.fits[near].effects)
+            for start in starts:
+                own = self.fitter_with(share)
+                fit = own.fit(start)
+                error = own.problem.left_out_rmse([*own.fixed, *fit.effects])
+                # What does not fit at all predicts nothing.
+                error = error if np.isfinite(error) else np.inf
+                if share not in self.fits or error < self.errors[share]:
+                    self.errors[share], self.fits[share] = error, fit
+
+    def proves(self) -> bool:
+        """Whether the best share is better than none by more than one parameter makes it."""
+        return schwarz_log_odds(
+            self.errors[0.0], self.errors[self.best], self._rows, 1) > 0.0
+
+    def interval(self) -> tuple[float, float]:
+        """Return the nearest shares tried that are surely less likely than the best (95 %)."""
+        shares = np.array(sorted(self.errors))
+        error = np.array([self.errors[share] for share in shares])
+        # Rows times the logarithm is the log likelihood, twice which is of chi square.
+        unlikely = self._rows * np.log(error / error.min()) > 0.5 * special.chdtri(
+            1, SIGNIFICANCE)
+        below, above = shares < self.best, shares > self.best
+        return (float(max(shares[unlikely & below], default=shares[0])),
+                float(min(shares[unlikely & above], default=shares[-1])))
 
 
 def _has_minor_loops(problem: BenchProblem) -> bool:
@@ -106,8 +177,3 @@ def _has_minor_loops(problem: BenchProblem) -> bool:
     least = float(np.ptp(drive)) / problem.levels
     return any(turns(drive[problem.trial == trial], least) > 1
                for trial in np.unique(problem.trial))
-
-
-def _with_intervals(fitter: BenchFitter, fit: Fit) -> list[Effect]:
-    """Return the effects of a fit with intervals; none where it is not finite."""
-    return fitter.with_intervals(fit) if np.all(np.isfinite(fit.predicted)) else []

@@ -25,14 +25,14 @@ from hysteresis_ros.diagnosis.significance import surely_larger, typical_error
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench_metrics import drive_slope, left_out
-from hysteresis_ros.identification.fixed_point import fixed_point
 from hysteresis_ros.identification.grid import FOLLOWING
+from hysteresis_ros.identification.kinetic_weights import KineticWeights, Tangent
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
-from hysteresis_ros.identification.nonnegative import extrapolated, part_of
+from hysteresis_ros.identification.nonnegative import extrapolated, part_of, solve
 from hysteresis_ros.identification.projection import ProjectedWeights
 from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.kinetic_stage import kinetic_stage, with_kinetics
+from hysteresis_ros.model.kinetic_stage import cold_input, with_kinetics
 from hysteresis_ros.operators import Preisach
 from hysteresis_ros.workers import map_in_forks
 
@@ -49,9 +49,9 @@ SEARCH_STRENGTH = 3e-9
 HELD_OUT_STRENGTH = 1e-9
 # How often weights and their feedback are fitted to each other.
 PASSES = 2
-# The same at most for weights and kinetics, which are fitted to each other until what these give
-# changes by less than the share of the response's spread: on twelve benches four passes do.
-MOST_PASSES, SETTLED = 8, 3e-4
+# Weights and kinetics are fitted to each other until the response changes by less than this share
+# of its spread.
+SETTLED = 3e-4
 # A finer grid has to lower the held-out error by this share.
 WORTH = 0.02
 # How much finer than the model's the grid of H2 may be once its effects are known.
@@ -103,15 +103,16 @@ class BenchProblem(Problem):
         # Which load each trial has, shape (trials,); those that count as the same are equal.
         self._load_of_trial = np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
         self._strength = SEARCH_STRENGTH
+        self.emphasis = np.ones(len(self.measured))
         self._forget()
 
     def _forget(self) -> None:
         """Begin without anything that was computed before."""
         self._holding_out: BenchProblem | None = None
-        self._passive: dict[bytes | None, np.ndarray] = {}
+        self._passive: dict[tuple | None, np.ndarray] = {}
         self._phases_of: tuple | None = None
         self._known_phases: list[np.ndarray] = []
-        self._known_kinetics: np.ndarray | None = None
+        self._kinetic_z: np.ndarray | None = None
 
     def finer(self) -> BenchProblem:
         """Return the same rows with H2 on the grid on which sets of effects are judged."""
@@ -140,7 +141,7 @@ class BenchProblem(Problem):
             Those of a neighbouring problem that are not at their bound, and the bias.
         """
         self._passive = {} if passive is None else {None: passive}
-        self._known_kinetics = None
+        self._kinetic_z = None
 
     def holding_out(self) -> BenchProblem:
         """Return the same rows and grid, with weights regularised as for rows held out."""
@@ -150,6 +151,32 @@ class BenchProblem(Problem):
             other._forget()
             self._holding_out = other
         return self._holding_out
+
+    def balanced(self, effects: Sequence[Effect], train: np.ndarray | None = None
+                 ) -> BenchProblem:
+        """
+        Return the same, with less weight on loads that are off by more than what matters.
+
+        Loads have errors of their own size, unknown beforehand (see `typical_error`): each row
+        counts with the variance of its fold, but for what is below `small_error`.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            Those with which rows are fitted.
+        train : ndarray of bool, shape (n,), optional
+            Rows that are fitted; all by default.
+        """
+        rows = np.ones(len(self.measured), dtype=bool) if train is None else train
+        fold = self.fold[rows]
+        squares = (self.measured - self.finer().simulate(effects, train))[rows] ** 2
+        variance = np.bincount(fold, weights=squares) / np.maximum(np.bincount(fold), 1)
+        weight = 1.0 / np.maximum(variance[fold], self.small_error ** 2)
+        other = copy.copy(self)
+        other.emphasis = np.ones(len(rows))
+        other.emphasis[rows] = np.sqrt(weight / np.mean(weight))
+        other._forget()
+        return other
 
     @functools.cached_property
     def loads_return(self) -> bool:
@@ -199,43 +226,58 @@ class BenchProblem(Problem):
     def _design(self, effects: Sequence[Effect], levels: int | None = None,
                 train: np.ndarray | None = None, feedback: Feedback | None = None,
                 columns: np.ndarray | None = None) -> Design:
-        course = self._courses.of(effects, feedback or self._feedback(effects, train))
         levels = levels or self.levels
+        feedback = feedback or self._feedback(effects, train, levels)
+        course = self._courses.of(effects, feedback)
         scale, known = self._courses.judged(course)
-        return Design(course.excitation.shares(levels, scale, columns), known,
-                      course.excitation.nodes(levels), course.excitation.smoothness(levels))
+        shares = course.excitation.shares(levels, scale, columns)
+        if feedback is not None and feedback.kinetics is not None:
+            rows, constant = feedback.kinetics
+            part = course.kinetics * scale
+            shares = shares + part[:, None] * (rows if columns is None else rows[:, columns])
+            known = known + part * constant
+        return Design(shares, known, course.excitation.nodes(levels),
+                      course.excitation.smoothness(levels))
 
-    def _feedback(self, effects: Sequence[Effect], train: np.ndarray | None) -> Feedback | None:
+    def _feedback(self, effects: Sequence[Effect], train: np.ndarray | None, levels: int
+                  ) -> Feedback | None:
         """Return what the best weights do that they depend on; None where it is nothing."""
         phases = self._phases(effects, train) if needs_phase(effects) else None
         if Chain(effects, self._surroundings).kinetics > 0.0:
-            return Feedback(phases, self._kinetics(effects, train, phases))
+            return Feedback(phases, self._kinetics(effects, train, phases, levels))
         return None if phases is None else Feedback(phases, None)
 
     def _kinetics(self, effects: Sequence[Effect], train: np.ndarray | None,
-                  phases: list[np.ndarray] | None) -> np.ndarray:
-        """Return what kinetics of all of the wire add to H2 with its best weights, (rows,)."""
-        def made(kinetics: np.ndarray) -> np.ndarray:
-            feedback = Feedback(phases, kinetics)
-            design = self._design(effects, train=train, feedback=feedback)
-            z = self._projected(design, train).z
-            return self._made_by_kinetics(effects, _operator(design, z), feedback)
+                  phases: list[np.ndarray] | None, levels: int) -> Tangent:
+        """Return what kinetics of all of the wire add to H2 near its best weights."""
+        plain = Feedback(phases, None)
+        design = self._design(effects, levels, feedback=plain)
+        kinetic = self._added_by_kinetics(effects, plain, design)
+        course = self._courses.of(effects, plain)
+        part = course.kinetics * self._courses.judged(course)[0]
+        rows = slice(None) if train is None else train
 
-        # What neighbouring parameters gave, or neighbouring rows, is near.
-        begin = (np.zeros(len(self._courses.load)) if self._known_kinetics is None
-                 else self._known_kinetics)
-        self._known_kinetics = fixed_point(
-            made, begin, SETTLED * float(np.std(self.measured)), MOST_PASSES)
-        return self._known_kinetics
+        def residual(z: np.ndarray) -> np.ndarray:
+            predicted = design.shares @ z + design.known + part * kinetic.added(z)
+            return (self.emphasis * (self.measured - predicted))[rows]
 
-    def _made_by_kinetics(self, effects: Sequence[Effect], stage: Preisach, feedback: Feedback
-                          ) -> np.ndarray:
-        """Return what kinetics of all of the wire add to the output of an H2, shape (rows,)."""
-        whole = kinetic_stage(self.model, Chain(effects, self._surroundings), stage, 1.0)
-        course = self._courses.of(effects, feedback)
-        kinetic, plain = (np.concatenate(self._courses.outputs(course, one))
-                          for one in (whole, stage))
-        return kinetic - plain
+        def solved(tangent: Tangent) -> tuple[np.ndarray, sparse.csr_matrix]:
+            near = self._design(effects, levels, feedback=Feedback(phases, tangent))
+            return self._projected(near, train).z, self._penalty(near, train)
+
+        # Neighbouring parameters, and neighbouring rows, have neighbouring weights.
+        if self._kinetic_z is None or len(self._kinetic_z) != design.shares.shape[1]:
+            self._kinetic_z = self._projected(design, train).z
+        self._kinetic_z = kinetic.fitted(
+            self._kinetic_z, residual, solved, SETTLED * float(np.std(self.measured)))
+        return kinetic.tangent(self._kinetic_z)
+
+    def _added_by_kinetics(self, effects: Sequence[Effect], plain: Feedback, design: Design
+                           ) -> KineticWeights:
+        """Return what kinetics of all of the wire add to H2 on the grid of a design."""
+        top = cold_input(self.model, Chain(effects, self._surroundings), float(design.nodes[0]),
+                         float(design.nodes[-1]))
+        return self._courses.of(effects, plain).excitation.kinetic(len(design.nodes) - 1, top)
 
     def _phases(self, effects: Sequence[Effect], train: np.ndarray | None) -> list[np.ndarray]:
         """
@@ -248,7 +290,7 @@ class BenchProblem(Problem):
         key = (None if train is None else train.tobytes(),
                *((effect.id, *effect.values.items()) for effect in effects))
         if key != self._phases_of:
-            feedback = self._feedback(effects, train)
+            feedback = self._feedback(effects, train, self.levels)
             design = self._design(effects, train=train, feedback=feedback)
             stage = _operator(design, self._projected(design, train).z)
             self._known_phases = self._phases_with(effects, stage, feedback)
@@ -263,13 +305,17 @@ class BenchProblem(Problem):
         course = self._courses.of(effects, feedback)
         return [model.martensite(output) for output in self._courses.outputs(course, whole)]
 
-    def _feedback_with(self, effects: Sequence[Effect], stage: Preisach, feedback: Feedback
-                       ) -> Feedback:
+    def _feedback_with(self, effects: Sequence[Effect], fit: WeightFit, design: Design,
+                       feedback: Feedback) -> Feedback:
         """Return the feedback of an H2, of the kinds that that of another one has."""
-        phases = None if feedback.phases is None else self._phases_with(effects, stage, feedback)
-        kinetics = (None if feedback.kinetics is None
-                    else self._made_by_kinetics(effects, stage, feedback))
-        return Feedback(phases, kinetics)
+        z = np.append(fit.weights * weight_sizes(design.nodes), fit.bias)
+        phases = feedback.phases
+        if phases is not None:
+            phases = self._phases_with(effects, _operator(design, z), feedback)
+        if feedback.kinetics is None:
+            return Feedback(phases, None)
+        kinetic = self._added_by_kinetics(effects, Feedback(phases, None), design)
+        return Feedback(phases, kinetic.tangent(z))
 
     def fit_stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray | None = None
                   ) -> tuple[WeightFit, Design]:
@@ -293,17 +339,16 @@ class BenchProblem(Problem):
         groups = self.trial[rows]
         if len(np.unique(groups)) == 1:
             groups = self.block[rows]
-        feedback = self._feedback(effects, train)
+        feedback = self._feedback(effects, train, levels)
         for remaining in range(PASSES if feedback else 0, -1, -1):
             design = self._design(effects, levels, feedback=feedback)
             fit = fit_weights(
                 design.rows[rows], (self.measured - design.known)[rows], groups=groups,
                 scale=weight_sizes(design.nodes), slack=SLACK,
-                penalty=smoothness(design.nodes, reversible=True))
+                penalty=smoothness(design.nodes, reversible=True), emphasis=self.emphasis[rows])
             if remaining and feedback:
                 # That of these weights, which are smoother, is not quite the same.
-                feedback = self._feedback_with(
-                    effects, operator_with(design.nodes, fit.weights, fit.bias), feedback)
+                feedback = self._feedback_with(effects, fit, design, feedback)
         return fit, design
 
     def stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray) -> Preisach:
@@ -326,7 +371,7 @@ class BenchProblem(Problem):
         train : ndarray of bool, shape (n,), optional
             Rows to fit; all by default.
         """
-        feedback = self._feedback(effects, train)
+        feedback = self._feedback(effects, train, self.levels)
         design = self._design(effects, feedback=feedback)
         weights = self._projected(design, train)
         return Solution(weights, self._response(effects, design, weights.z), feedback)
@@ -362,8 +407,9 @@ class BenchProblem(Problem):
 
     def _rows(self, design: Design, train: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Return design and target of the training rows."""
-        target = self.measured - design.known
-        return (design.shares, target) if train is None else (design.shares[train], target[train])
+        rows, target = self.emphasis[:, None] * design.shares, self.emphasis * (
+            self.measured - design.known)
+        return (rows, target) if train is None else (rows[train], target[train])
 
     def _further(self, design: Design, train: np.ndarray | None) -> np.ndarray:
         """
@@ -377,16 +423,21 @@ class BenchProblem(Problem):
         return extrapolated(shares, train)
 
     def _projected(self, design: Design, train: np.ndarray | None) -> ProjectedWeights:
-        # Neighbouring parameters have neighbouring weights.
-        key = None if train is None else train.tobytes()
+        # Neighbouring parameters have neighbouring weights, on the same grid.
+        key = len(design.nodes), None if train is None else train.tobytes()
+        start = self._passive.get(key, self._passive.get(None))
+        if start is not None and len(start) != design.shares.shape[1]:
+            start = None
+        found = ProjectedWeights(*self._rows(design, train), self._penalty(design, train), start)
+        self._passive[key] = found.passive
+        return found
+
+    def _penalty(self, design: Design, train: np.ndarray | None) -> sparse.csr_matrix:
         penalty = self._strength * design.smoothness
         if train is not None:
             penalty += sparse.diags(
                 self._further(design, train) * penalty.diagonal(), format='csr')
-        found = ProjectedWeights(*self._rows(design, train), penalty,
-                                 self._passive.get(key, self._passive.get(None)))
-        self._passive[key] = found.passive
-        return found
+        return penalty
 
     def _sensed(self, effect: SensorEffect, response: np.ndarray) -> np.ndarray:
         sensed = response.copy()
@@ -396,6 +447,28 @@ class BenchProblem(Problem):
                 time=self.signals['time'][rows])
             sensed[rows] = effect.forward(response[rows], inputs)
         return sensed
+
+    def left_out_rmse(self, effects: Sequence[Effect]) -> float:
+        """
+        Return the RMSE of a row left out, by generalised cross-validation.
+
+        The RMSE of all rows, divided by the share of them that the weights cannot follow: 1 - trace
+        of the hat matrix / n (Golub, Heath and Wahba, Technometrics 21 (1979) 215).
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        """
+        solution = self.solve(effects)
+        design = self._design(effects, feedback=solution.feedback)
+        columns, count = solution.weights.columns, len(self.measured)
+        rows = design.shares[:, columns]
+        gram = rows.T @ rows / count
+        followed = np.trace(solve(
+            gram + self._strength * part_of(design.smoothness, columns), gram))
+        residual = self.measured - solution.predicted
+        return float(np.sqrt(np.mean(residual ** 2)) / (1.0 - followed / count))
 
     def weight_columns(self, effects: Sequence[Effect]) -> np.ndarray:
         """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""

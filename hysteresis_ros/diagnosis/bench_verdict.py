@@ -84,17 +84,15 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
 
 
 def _kinetics(selection: BenchSelection) -> dict[str, Any] | None:
-    """Return what kinetics explain of loads held out with the effects found; see `Diagnosis`."""
+    """Return what kinetics explain of rows left out with the effects found; see `Diagnosis`."""
     if selection.problem.catalogue is not None:
         return None     # tried as any other effect, or not asked for
-    shown = shown_kinetics(
-        selection.fitter, selection.found.effects, selection.settings.practical, selection.rng)
+    shown = shown_kinetics(selection.fitter, selection.found.effects)
     if shown is None:
         return None
     size, = Kinetics.parameters
     return {'effect': Kinetics.id, size.name: shown.effects[-1].values[size.name],
-            'rmse_before': selection.typical_rmse(shown.before),
-            'rmse_after': selection.typical_rmse(shown.after)}
+            'rmse_before': shown.before, 'rmse_after': shown.after}
 
 
 def _sensor_noise(problem: BenchProblem) -> float:

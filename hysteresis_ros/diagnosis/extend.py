@@ -22,6 +22,7 @@ from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.selection import Selection
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import Effect, effect_class
+from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.measurements.quantities import shown
 from hysteresis_ros.model import MuscleModel, Simulator
@@ -262,8 +263,12 @@ def extended_model(model: MuscleModel, names: Sequence[str], train: Sequence[Mea
     that a diagnosis of the same bench has fitted before.
     """
     problem, classes = _without(model, names, train)
-    added = (_fitted_together(problem, model, classes, known) if problem.refits
-             else _on_arm(problem, model, classes)[-1][0])
+    if problem.refits:
+        added = _fitted_together(problem, model, classes, known)
+        problem = problem.balanced(added)
+        added = _balanced(problem, added)
+    else:
+        added = _on_arm(problem, model, classes)[-1][0]
     completed = problem.completed([*unaffected(problem.model.effects, added), *added])
     return _stamped(completed, added, train, problem.kind), added
 
@@ -274,7 +279,8 @@ def _fitted_together(problem: BenchProblem, model: MuscleModel, classes: Sequenc
     fitter, kind = BenchFitter(problem.finer()), problem.kind
     # What held-out rows have determined is not fitted again to rows that cannot tell it.
     fixed = {effect.id for effect in known
-             if can_be_located(effect, kind) and not not_determined(effect, kind)}
+             if (can_be_located(effect, kind) or isinstance(effect, Kinetics))
+             and not not_determined(effect, kind)}
     if fixed:
         return with_best_forms(fitter, known, fixed)
     added = with_best_forms(fitter, _on_bench(problem, model, classes)[-1][0])
@@ -288,6 +294,19 @@ def _fitted_together(problem: BenchProblem, model: MuscleModel, classes: Sequenc
     if best.implausible() and not any(effect.implausible() for effect in known):
         return with_best_forms(fitter, known, {effect.id for effect in known})
     return with_best_forms(fitter, fitter.with_intervals(best))
+
+
+def _balanced(problem: BenchProblem, added: list[Effect]) -> list[Effect]:
+    """Return effects of a bench fitted to rows of unequal weight; as they are if these are not."""
+    if np.ptp(problem.emphasis) == 0.0:
+        return added
+    fitter = BenchFitter(problem.finer())
+    fitter.fixed = [effect for effect in added if isinstance(effect, Kinetics)]
+    fit = fitter.fit([effect for effect in added if effect not in fitter.fixed])
+    if fit.implausible():
+        return added
+    found = {effect.id: effect for effect in (*fitter.with_intervals(fit), *fitter.fixed)}
+    return [found[effect.id] for effect in added]
 
 
 def _unobservable(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],

@@ -40,17 +40,18 @@ def with_replicates(model: MuscleModel, problem: BenchProblem, by_hand: bool = F
     -------
     MuscleModel
     """
-    stage, finer = model.length_stage, problem.finer()
+    stage = model.length_stage
     assert isinstance(stage, Preisach)      # no other one has effects on a bench
     levels = len(stage.nodes) - 1
 
     def replicate(left_out: np.ndarray) -> Replicate:
         effects = model.effects
+        balanced = problem.balanced(effects, ~left_out)
         if not by_hand:
-            response = Response(finer.apart(), [], effects, ~left_out)
+            response = Response(balanced.finer(), [], effects, ~left_out)
             effects = response.parameters.with_vector(response.minimise(
                 response.parameters.vector(), MOST_EVALUATIONS, TOLERANCE))
-        return Replicate(problem.apart().stage(effects, levels, ~left_out), effects)
+        return Replicate(balanced.stage(effects, levels, ~left_out), effects)
 
     return dataclasses.replace(model, replicates=map_in_forks(
         replicate, folds_of(problem.left_out_together), problem.jobs))

@@ -75,7 +75,31 @@ def gain_interval(before: np.ndarray, after: np.ndarray, block: np.ndarray,
                                  level, count)
 
 
-def schwarz_log_odds(before: float, after: float, rows: int, parameters: int) -> float:
+def independent_rows(residual: np.ndarray, trial: np.ndarray, least: int) -> float:
+    """
+    Return how many independent rows tell as much as those of a residual, as if of a Markov chain.
+
+    n (1 - r) / (1 + r) with the autocorrelation r of rows that follow each other (Bartlett, J. R.
+    Stat. Soc. 98 (1935) 536).
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+    trial : ndarray of int, shape (n,)
+        Rows of different trials do not follow each other.
+    least : int
+        Number that is not undercut.
+    """
+    follows = trial[1:] == trial[:-1]
+    square = float(np.mean(residual ** 2))
+    if square == 0.0 or not follows.any():
+        return float(len(residual))
+    correlation = float(np.mean((residual[1:] * residual[:-1])[follows])) / square
+    share = (1.0 - correlation) / max(1.0 + correlation, 1e-9)
+    return float(np.clip(share * len(residual), min(least, len(residual)), len(residual)))
+
+
+def schwarz_log_odds(before: float, after: float, rows: float, parameters: int) -> float:
     """
     Return the log odds of a least squares fit against one with fewer parameters.
 
@@ -88,7 +112,7 @@ def schwarz_log_odds(before: float, after: float, rows: int, parameters: int) ->
     ----------
     before, after : float
         RMSE with fewer and with more parameters, in the same unit.
-    rows : int
+    rows : float
         n.
     parameters : int
         k, how many more there are.

@@ -84,7 +84,8 @@ def fit_weights(
         scale: Optional[np.ndarray] = None, penalty: Optional[np.ndarray] = None,
         sign: Optional[int] = 1, strength: Optional[float] = None,
         strengths: Optional[Sequence[float]] = None, slack: Optional[tuple] = None,
-        anchor: Optional[Anchor] = None) -> WeightFit:
+        anchor: Optional[Anchor] = None,
+        emphasis: Optional[np.ndarray] = None) -> WeightFit:
     """
     Identify weights of one sign and a free bias.
 
@@ -114,6 +115,8 @@ def fit_weights(
         no such limit.
     anchor : Anchor, optional
         Output to be met exactly; it takes the freedom of the bias.
+    emphasis : ndarray, shape (M,), optional
+        By how much the error of every row counts, its mean square 1; default 1.
 
     Returns
     -------
@@ -126,10 +129,11 @@ def fit_weights(
     """
     if sign is None:
         fits = [fit_weights(rows, target, groups=groups, scale=scale, penalty=penalty, sign=s,
-                            strength=strength, strengths=strengths, slack=slack, anchor=anchor)
+                            strength=strength, strengths=strengths, slack=slack, anchor=anchor,
+                            emphasis=emphasis)
                 for s in (1, -1)]
         return min(fits, key=lambda fit: fit.rmse)
-    problem = _Problem.build(rows, target, groups, scale, penalty, sign, anchor)
+    problem = _Problem.build(rows, target, groups, scale, penalty, sign, anchor, emphasis)
     if strength == 0.0:
         return problem.plain()
     tried = np.sort(np.asarray(STRENGTHS if strengths is None else strengths, dtype=float))
@@ -142,7 +146,7 @@ def fit_weights(
     path = problem.path(tried, slack)
     tried = tried[:len(path)]
     errors = problem.held_out_errors(tried, path)
-    validation = np.sqrt(np.mean(errors ** 2, axis=1))
+    validation = np.sqrt(np.mean((problem.emphasis * errors) ** 2, axis=1))
     best = int(np.argmin(validation))
     return problem.regularised(tried[best], tried, validation, errors[best], path[best])
 
@@ -156,6 +160,7 @@ class _Problem:
     anchor: Anchor          # what rows and target are counted from; zeros if not anchored
     free: np.ndarray        # (K + 1,), whether an unknown has no bound: the bias, if not anchored
     penalty: np.ndarray     # (R, K + 1)
+    emphasis: np.ndarray    # (M,)
     folds: list
     unit: np.ndarray        # (K + 1,), weight = x * unit
     output_range: float
@@ -164,7 +169,7 @@ class _Problem:
     @classmethod
     def build(cls, rows: np.ndarray, target: np.ndarray, groups: np.ndarray | None,
               scale: np.ndarray | None, penalty: np.ndarray | None, sign: int,
-              anchor: Anchor | None) -> '_Problem':
+              anchor: Anchor | None, emphasis: np.ndarray | None) -> '_Problem':
         rows = np.asarray(rows, dtype=float)
         target = np.asarray(target, dtype=float)
         if rows.ndim != 2 or target.shape != rows.shape[:1] or 0 in rows.shape:
@@ -198,13 +203,14 @@ class _Problem:
             design=np.column_stack([shares, bias]),
             target=(target - anchor.value) / output_range, anchor=anchor, free=free,
             penalty=np.column_stack([penalty, np.zeros(len(penalty))]),
+            emphasis=np.ones(len(target)) if emphasis is None else emphasis,
             folds=folds_of(groups), unit=unit, output_range=output_range, sign=sign)
 
     @functools.cached_property
     def _reduced(self) -> tuple:
         """Mean square problem with no more rows than unknowns, by one QR: (design, target)."""
-        root = np.sqrt(len(self.target))
-        design, target = self.design / root, self.target / root
+        root = self.emphasis / np.sqrt(len(self.target))
+        design, target = root[:, None] * self.design, root * self.target
         if len(target) <= design.shape[1]:
             return design, target
         orthogonal, triangle = linalg.qr(design, mode='economic')
@@ -248,7 +254,7 @@ class _Problem:
         for strength in strengths:
             x, passive = solve_nonnegative(gram + strength * self._curvature, moment, self.free,
                                            found[-1][1] if found else None)
-            rmse = np.sqrt(np.mean((self.design @ x - self.target) ** 2))
+            rmse = np.sqrt(np.mean((self.emphasis * (self.design @ x - self.target)) ** 2))
             if rmse > limit:
                 break
             if not found and slack is not None:
@@ -275,7 +281,8 @@ class _Problem:
 
     def _moments(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the mean Gram matrix and the mean of design times target."""
-        design, target = self.design[rows], self.target[rows]
+        weights = self.emphasis[rows]
+        design, target = weights[:, None] * self.design[rows], weights * self.target[rows]
         return design.T @ design / len(target), design.T @ target / len(target)
 
     def regularised(self, strength: float, strengths: Sequence[float] | np.ndarray = (),
@@ -290,7 +297,7 @@ class _Problem:
         """
         x, passive = solved or self.path(np.array([strength]))[0]
         x = self._polish(x, passive, strength)
-        block = self.design[:, passive]
+        block = self.emphasis[:, None] * self.design[:, passive]
         covariance = linalg.inv(block.T @ block + len(self.target) * strength
                                 * self._curvature[np.ix_(passive, passive)])
         leverage = np.sum((block @ covariance) * block, axis=1)

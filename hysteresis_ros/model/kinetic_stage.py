@@ -65,11 +65,24 @@ def kinetic_stage(model: MuscleModel, chain: Chain, stage: HysteresisOperator, s
     """
     stage = contracting(
         model, stage, 'a wire whose minor loops follow its kinetics (effect kinetics)')
+    return _kinetic(stage, share, cold_input(model, chain, stage.lower, stage.upper))
+
+
+def cold_input(model: MuscleModel, chain: Chain, lower: float, upper: float) -> float:
+    """
+    Return the input of H2 at which all has transformed; see `with_kinetics`.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    chain : Chain
+    lower, upper : float
+        Range of H2; what is not inside it begins at its upper end.
+    """
     first = model.first_stage(chain)
     first.reset()
     cold = load_along(model, chain, 1.0) - first.step(chain.to_drive_squared(model.cold_drive))
-    top = float(cold) if stage.lower < cold < stage.upper else stage.upper
-    return _kinetic(stage, share, top)
+    return float(cold) if lower < cold < upper else upper
 
 
 @functools.lru_cache(maxsize=MOST_STAGES)

@@ -52,7 +52,7 @@ def _wire_in_words(found: Diagnosis, own: dict[str, Any], hidden_from: str, what
     before, after = (f'{scale * own[name]:.2g}' for name in ('rmse_before', 'rmse_after'))
     residual = (f'The residual of {before} {unit} may be that of the wire itself, in a way that '
                 f'{hidden_from}:' if hidden_from else
-                f'Loads held out show the wire itself: their typical RMSE is {before} {unit}, and')
+                f'Minor loops show the wire itself: a row left out is off by {before} {unit}, and')
     return f'{residual} with {what} it is {after} {unit}; `extend --add {own["effect"]}` adds it.'
 
 

@@ -1,0 +1,88 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The rows of a bench: which count less, and what one left out is off by."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.laboratory.experiments import bench_tables
+from hysteresis_ros.measurements import Measurement
+
+TRIALS = {'length_trials': range(4), 'force_trials': [0]}
+USUAL = ['stress_dependence', 'stress_dependent_strain', 'series_compliance']
+
+
+@pytest.fixture(scope='module')
+def tables():
+    """Return lengths and forces of a bench."""
+    return [Measurement.from_columns(bench_tables({}, 11)[name])
+            for name in ('length.csv', 'force.csv')]
+
+
+@pytest.fixture(scope='module')
+def model(tables):
+    """Return a model of it with what every loaded muscle has."""
+    return add_effects(identify(*tables, **TRIALS).model, *tables, USUAL, **TRIALS)[0]
+
+
+def problem_of(model, tables, off=0.0):
+    """Return the rows, those of the third load jumping to and fro at random."""
+    fitted = tables[0].select(range(4))
+    columns = {name: np.array(values) for name, values in fitted.columns.items()}
+    jumps = np.random.default_rng(1).choice([-off, off], len(columns['length']))
+    columns['length'] = columns['length'] + jumps * (columns['trial'] == 2.0)
+    bare = dataclasses.replace(model, effects=[], replicates=[])
+    return problem_for(bare, [Measurement.from_columns(columns)])
+
+
+def test_loads_that_are_fitted_well_count_alike(model, tables):
+    problem = problem_of(model, tables)
+    balanced = problem.balanced(model.effects)
+    assert np.ptp(balanced.emphasis) == 0.0
+    assert balanced.simulate(model.effects) == pytest.approx(problem.simulate(model.effects))
+
+
+def test_a_load_that_is_off_counts_less(model, tables):
+    clean, problem = problem_of(model, tables), problem_of(model, tables, 2e-3)
+    balanced = problem.balanced(model.effects)
+    third = problem.trial == 2
+    assert np.mean(balanced.emphasis ** 2) == pytest.approx(1.0)
+    assert np.ptp(balanced.emphasis[third]) == 0.0
+    assert balanced.emphasis[third][0] < 0.4 * balanced.emphasis[~third].min()
+    # The others are as they were before, in the search and in the model.
+    errors = [np.std((one.simulate(model.effects) - clean.measured)[~third])
+              for one in (clean, problem, balanced)]
+    assert errors[0] < errors[2] < 0.5 * errors[1]
+    whole = [one.completed(model.effects).predict(tables[0].select(range(4)))
+             for one in (clean, problem, balanced)]
+    errors = [np.std((one - clean.measured)[~third]) for one in whole]
+    assert errors[2] < 0.6 * errors[1]
+
+
+def test_rows_that_are_not_fitted_do_not_decide_what_counts(model, tables):
+    train = problem_of(model, tables).trial != 2
+    one, other = (problem_of(model, tables, off).balanced(model.effects, train)
+                  for off in (0.0, 2e-3))
+    assert one.emphasis[train] == pytest.approx(other.emphasis[train])
+    assert np.ptp(problem_of(model, tables, 2e-3).balanced(model.effects).emphasis[train]) > 0.1
+
+
+def test_a_row_left_out_is_off_by_more_the_more_rows_the_weights_follow(model, tables):
+    """The share that they follow is how far they go with each row, on average."""
+    problem = problem_of(model, tables)
+    predicted = problem.simulate(model.effects)
+    step, followed = 1e-7, []
+    measured = problem.measured.copy()
+    for row in range(len(measured)):
+        problem.measured = measured.copy()
+        problem.measured[row] += step
+        followed.append((problem.simulate(model.effects) - predicted)[row] / step)
+    problem.measured = measured
+    expected = np.sqrt(np.mean((measured - predicted) ** 2)) / (1.0 - np.mean(followed))
+    assert problem.left_out_rmse(model.effects) == pytest.approx(expected, rel=0.02)
+    assert 0.05 < np.mean(followed) < 0.5
