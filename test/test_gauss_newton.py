@@ -115,7 +115,7 @@ def test_a_step_is_no_longer_than_the_range_of_a_parameter():
     assert step == pytest.approx([0.6, -0.8])
 
 
-def test_damping_is_a_share_of_the_largest_curvature():
+def test_damping_is_a_share_of_each_curvature():
     step = damped_step(np.diag([4.0, 1.0]), np.array([-0.4, -0.1]), 0.5, np.full(2, -9.0),
                        np.full(2, 9.0))
-    assert step == pytest.approx([0.4 / 6.0, 0.1 / 3.0])
+    assert step == pytest.approx([0.4 / 6.0, 0.1 / 1.5])

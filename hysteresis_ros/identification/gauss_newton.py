@@ -3,7 +3,7 @@
 """
 Nonlinear least squares within bounds, for few parameters and residuals that are dear.
 
-Gauss-Newton steps with Levenberg's damping, each the best within the bounds. Unlike
+Gauss-Newton steps with Marquardt's damping, each the best within the bounds. Unlike
 `scipy.optimize.least_squares` this takes no derivative that no step uses, and costs nothing to
 import.
 """
@@ -12,8 +12,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-# Damping, as a share of the largest curvature: at first, and its factors after success and failure.
-DAMPING, LESS, MORE = 1e-3, 0.1, 10.0
+# Damping, as a share of each parameter's own curvature (Marquardt, J. SIAM 11 (1963) 431): at
+# first, and its factors after success and failure. With less at first some Lagoudas' benches end in
+# the simplest form of what their load does.
+DAMPING, LESS, MORE = 3e-2, 0.1, 10.0
+# A curvature counts as this share of the largest at least, and is never 0.
+SMALLEST, TINY = 1e-9, 1e-300
 # Longest step, in the parameters' units, in which their range is about one.
 LONGEST = 1.0
 # Components held or let go for one step, at most, for each parameter.
@@ -81,7 +85,7 @@ def damped_step(curvature: np.ndarray, gradient: np.ndarray, damping: float, low
     curvature : ndarray, shape (k, k)
     gradient : ndarray, shape (k,)
     damping : float
-        Added to the diagonal, as a share of its largest entry.
+        Added to the diagonal, as a share of each of its entries.
     lowest, highest : ndarray, shape (k,)
         Bounds of the step; 0 is within.
 
@@ -90,7 +94,8 @@ def damped_step(curvature: np.ndarray, gradient: np.ndarray, damping: float, low
     ndarray, shape (k,)
     """
     size = len(gradient)
-    damped = curvature + max(damping * float(np.max(np.diag(curvature))), 1e-300) * np.eye(size)
+    own = np.diag(curvature)
+    damped = curvature + damping * np.diag(np.maximum(own, SMALLEST * float(own.max()) + TINY))
     step, free = np.zeros(size), np.ones(size, dtype=bool)
     for _ in range(MOST_CHANGES * size):
         ends = ~free
