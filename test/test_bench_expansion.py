@@ -129,3 +129,15 @@ def test_lengths_that_verify_are_predicted_better_with_it(muscle):
     before, after = (one.metrics['length']['verification']['model']['mean_percent']
                      for one in (without, model))
     assert after < 0.65 * before
+
+
+@pytest.mark.slow
+def test_a_wire_that_contracts_with_its_temperature_is_said_to():
+    """Tanaka's equations: 0.55 MPa/K, 13 GPa when cold and 30 GPa when hot, 97 K at 6 V."""
+    tables = bench_tables({}, 8401, 'tanaka')
+    force, length = (Measurement.from_columns(tables[name]) for name in (
+        'force.csv', 'length.csv'))
+    added = add_effects(identify(length, force, **TRIALS).model, length, force, **TRIALS)[1]
+    expansion = next(effect for effect in added if effect.id == 'thermal_expansion')
+    assert expansion.sign == -1.0
+    assert 97.0 * 0.55e-3 / 30.0 < 0.01 * expansion.alpha < 97.0 * 0.55e-3 / 13.0

@@ -30,6 +30,16 @@ def test_a_heated_wire_expands_with_the_square_of_its_drive():
     np.testing.assert_array_equal(factor, 1.0)
 
 
+def test_one_that_contracts_does_so_as_much():
+    around = bicep_model().surroundings
+    drive = np.array([0.0, 3.0, 5.0])
+    longer, shorter = (Chain([KIND(around, alpha=0.2, sign=sign)], around).drift(
+        drive, drive ** 2, RESTING)[0] for sign in (1.0, -1.0))
+    np.testing.assert_array_equal(shorter, -longer)
+    # What earlier versions saved has no sign.
+    assert KIND(around, alpha=0.2).sign == 1.0 and longer[-1] > 0.0
+
+
 def test_one_whose_temperature_is_the_drive_has_a_coefficient_per_kelvin():
     around = bicep_model().surroundings._replace(
         drive='temperature', full_drive_squared=300.0, length=1.0)

@@ -15,10 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.determined import not_determined
-from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.diagnosis.significance import schwarz_log_odds
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.effects.thermal_expansion import ThermalExpansion
+
+# Of the fit with all effects; see `BenchFitter.fit`.
+EVALUATIONS, TOLERANCE = 30, 1e-4
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_fit import Fit
@@ -52,14 +55,23 @@ def with_expansion(fitter: BenchFitter, known: Sequence[Effect], practical: floa
         return list(known)
     with np.errstate(all='ignore'):
         before = fitter.fit(known)
-        after = fitter.fit([*before.effects, *usual([ThermalExpansion(surroundings)], 'bench')])
-        if not np.all(np.isfinite(after.predicted)) or after.implausible():
-            return list(known)
-        effects = fitter.with_intervals(after)
-        if (not_determined(effects[-1], problem.kind) or not _proves(problem, before, after)
-                or _harms(fitter, before, after, practical)):
-            return list(known)
-    return effects
+        alone = fitter.apart()
+        alone.fixed = [*fitter.fixed, *before.effects]
+        expansion = min((alone.fit([start]) for start in starts_of(
+            ThermalExpansion(surroundings), 'bench')), key=lambda fit: fitter.error(fit.predicted))
+        effects = [*before.effects, *expansion.effects]
+        # With one parameter more, others that rows hardly determine may end far from where they
+        # were: then all of them stay as they are.
+        for after in (fitter.fit(effects, evaluations=EVALUATIONS, tolerance=TOLERANCE),
+                      fitter.fit(effects, evaluations=1)):
+            if not np.all(np.isfinite(after.predicted)) or after.implausible():
+                continue
+            found = fitter.with_intervals(after)
+            if not (not_determined(found[-1], problem.kind)
+                    or not _proves(problem, before, after)
+                    or _harms(fitter, before, after, practical)):
+                return found
+    return list(known)
 
 
 def _proves(problem: BenchProblem, before: Fit, after: Fit) -> bool:

@@ -28,7 +28,8 @@ def can_be_located(effect: Effect, kind: str) -> bool:
 
 
 def _free(effect: Effect, kind: str) -> list[Parameter]:
-    return [parameter for parameter in effect.parameters if kind in parameter.kinds]
+    return [parameter for parameter in effect.parameters
+            if kind in parameter.kinds and not parameter.choices]
 
 
 def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
