@@ -75,7 +75,11 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetic
         return None
     with np.errstate(all='ignore'):
         profile = _Profile(fitter, found)
-        profile.evaluate(COARSE)
+        profile.evaluate(COARSE[:1])
+        # The error bends but once.
+        if profile.unlikely(COARSE[0]):
+            return None
+        profile.evaluate(COARSE[1:])
         if profile.best == 0.0:
             return None
         profile.evaluate(FINE)
@@ -153,16 +157,17 @@ class _Profile:
         return schwarz_log_odds(
             self.errors[0.0], self.errors[self.best], self._rows, 1) > 0.0
 
-    def interval(self) -> tuple[float, float]:
-        """Return the nearest shares tried that are surely less likely than the best (95 %)."""
-        shares = np.array(sorted(self.errors))
-        error = np.array([self.errors[share] for share in shares])
+    def unlikely(self, share: float) -> bool:
+        """Whether a share is surely less likely than the best (95 %)."""
         # Rows times the logarithm is the log likelihood, twice which is of chi square.
-        unlikely = self._rows * np.log(error / error.min()) > 0.5 * special.chdtri(
-            1, SIGNIFICANCE)
-        below, above = shares < self.best, shares > self.best
-        return (float(max(shares[unlikely & below], default=shares[0])),
-                float(min(shares[unlikely & above], default=shares[-1])))
+        ratio = self._rows * np.log(self.errors[share] / self.errors[self.best])
+        return bool(ratio > 0.5 * special.chdtri(1, SIGNIFICANCE))
+
+    def interval(self) -> tuple[float, float]:
+        """Return the nearest shares tried that are surely less likely than the best."""
+        ends = [share for share in self.errors if self.unlikely(share)]
+        return (max((share for share in ends if share < self.best), default=0.0),
+                min((share for share in ends if share > self.best), default=1.0))
 
 
 def _has_minor_loops(problem: BenchProblem) -> bool:

@@ -19,7 +19,8 @@ import numpy as np
 from scipy import sparse
 
 from hysteresis_ros.diagnosis.bench_courses import BenchCourses
-from hysteresis_ros.diagnosis.bench_design import Design, Feedback, operator_with, weight_sizes
+from hysteresis_ros.diagnosis.bench_design import (
+    Course, Design, Feedback, operator_with, weight_sizes)
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.diagnosis.significance import surely_larger, typical_error
 from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
@@ -79,7 +80,16 @@ class Solution:
 
 
 class BenchProblem(Problem):
-    """Bench tables, with weights refitted to the training rows for every set of effects."""
+    """
+    Bench tables, with weights refitted to the training rows for every set of effects.
+
+    Attributes
+    ----------
+    levels : int
+        Of the grid of H2.
+    emphasis : ndarray, shape (n,)
+        By how much the error of each row counts in the fits; see `balanced`.
+    """
 
     refits: Literal[True] = True
 
@@ -252,8 +262,8 @@ class BenchProblem(Problem):
         """Return what kinetics of all of the wire add to H2 near its best weights."""
         plain = Feedback(phases, None)
         design = self._design(effects, levels, feedback=plain)
-        kinetic = self._added_by_kinetics(effects, plain, design)
         course = self._courses.of(effects, plain)
+        kinetic = self._added_by_kinetics(effects, course, design.nodes)
         part = course.kinetics * self._courses.judged(course)[0]
         rows = slice(None) if train is None else train
 
@@ -272,12 +282,12 @@ class BenchProblem(Problem):
             self._kinetic_z, residual, solved, SETTLED * float(np.std(self.measured)))
         return kinetic.tangent(self._kinetic_z)
 
-    def _added_by_kinetics(self, effects: Sequence[Effect], plain: Feedback, design: Design
+    def _added_by_kinetics(self, effects: Sequence[Effect], course: Course, nodes: np.ndarray
                            ) -> KineticWeights:
-        """Return what kinetics of all of the wire add to H2 on the grid of a design."""
-        top = cold_input(self.model, Chain(effects, self._surroundings), float(design.nodes[0]),
-                         float(design.nodes[-1]))
-        return self._courses.of(effects, plain).excitation.kinetic(len(design.nodes) - 1, top)
+        """Return what kinetics of all of the wire add to H2 on a grid."""
+        top = cold_input(self.model, Chain(effects, self._surroundings), float(nodes[0]),
+                         float(nodes[-1]))
+        return course.excitation.kinetic(len(nodes) - 1, top)
 
     def _phases(self, effects: Sequence[Effect], train: np.ndarray | None) -> list[np.ndarray]:
         """
@@ -314,7 +324,8 @@ class BenchProblem(Problem):
             phases = self._phases_with(effects, _operator(design, z), feedback)
         if feedback.kinetics is None:
             return Feedback(phases, None)
-        kinetic = self._added_by_kinetics(effects, Feedback(phases, None), design)
+        course = self._courses.of(effects, Feedback(phases, None))
+        kinetic = self._added_by_kinetics(effects, course, design.nodes)
         return Feedback(phases, kinetic.tangent(z))
 
     def fit_stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray | None = None
