@@ -93,7 +93,7 @@ class Diagnosis(Result):
         of constant loads shows and `structural_error` counts; see `diagnosis.not_on_bench`.
     kinetics : dict or None
         The same of kinetics that leave minor loops open, of which a bench goes through few; on a
-        bench what they explain of loads held out, with typical RMSEs.
+        bench what they explain of a row left out, with the RMSE that it would have.
     """
 
     verdict: str
