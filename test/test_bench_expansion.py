@@ -113,7 +113,8 @@ def test_one_that_was_left_out_is_not_sought_again(usual, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('muscle', ['grains', pytest.param('lagoudas', marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('muscle', ['grains', 'lagoudas'])
 def test_lengths_that_verify_are_predicted_better_with_it(muscle):
     """22 millionths per kelvin are a thirtieth of the stroke."""
     hidden = experiment_tables('bench', {'thermal_expansion': 1.0}, 51, muscle)

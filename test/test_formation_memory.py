@@ -323,9 +323,9 @@ def test_other_muscles_of_the_laboratory_do_not_have_it():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize('muscle, seed, effects', [
-    pytest.param('grains', 2, {'formation_memory': 1.0}, marks=pytest.mark.long),
-    ('lagoudas', 1, {}), pytest.param('grains', 2, {}, marks=pytest.mark.long)])
+    ('grains', 2, {'formation_memory': 1.0}), ('lagoudas', 1, {}), ('grains', 2, {})])
 def test_kept_strain_of_the_laboratory_is_named_or_told_and_none_where_there_is_none(
         muscle, seed, effects):
     """Wires after Lagoudas keep it by themselves; grains where it is hidden in them."""

@@ -184,6 +184,7 @@ class WideMaterial(GrainMaterial):
         return WideWire(self)
 
 
+@LONG
 def test_loops_that_widen_by_another_law_are_wide_for_the_same_reason():
     fields = {field.name: getattr(specimen(5), field.name)
               for field in dataclasses.fields(specimen(5))}

@@ -104,7 +104,8 @@ def stroke_of(material):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', [3, pytest.param(4, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('seed', [3, 4])
 def test_it_is_named_where_the_moduli_differ_and_no_growth_of_the_strain(seed):
     material, (model, added) = bench_of(MODULI, seed)
     found = {effect.id: effect for effect in added}

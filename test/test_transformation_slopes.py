@@ -132,6 +132,7 @@ def bench_tables(material, seed):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_slopes_that_differ_are_named_on_the_bench_and_no_r_phase():
     """C_M / C_A = 1.3; that came out as an R-phase."""
     material = dataclasses.replace(specimen(2), cooling_ratio=1.3)
