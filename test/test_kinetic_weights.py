@@ -4,6 +4,7 @@
 
 import numpy as np
 import pytest
+from scipy import optimize, sparse
 
 from hysteresis_ros.diagnosis.bench_design import operator_with, weight_sizes
 from hysteresis_ros.identification.kinetic_weights import KineticWeights
@@ -72,3 +73,57 @@ def test_the_tangent_touches_the_response(kinetic, zeros):
 def test_without_weights_nothing_is_added(kinetic):
     none = np.zeros(len(weight_sizes(NODES)) + 1)
     assert not kinetic.added(none).any() and np.all(np.isfinite(kinetic.tangent(none).rows))
+
+
+@pytest.fixture
+def fitting(excited, kinetic):
+    """Return residual, solution of a tangent, and the weights that both are to find."""
+    true, plain = some_weights(5), plain_shares(excited)
+    target = plain @ true + kinetic.added(true)
+    penalty = sparse.identity(len(true), format='csr') * 1e-9
+    root = np.sqrt(len(target) * 1e-9) * np.eye(len(true))
+
+    def residual(z):
+        return target - plain @ z - kinetic.added(z)
+
+    def solved(tangent):
+        rows = np.vstack([plain + tangent.rows, root])
+        return optimize.nnls(rows, np.append(target - tangent.constant, np.zeros(len(true))),
+                             maxiter=9999)[0], penalty
+    return residual, solved, true
+
+
+def test_weights_are_fitted_from_tangent_to_tangent(kinetic, fitting):
+    residual, solved, _ = fitting
+    start = some_weights(6, 0.0)
+    costs, tangents = [], []
+
+    def watched(tangent):
+        tangents.append(tangent)
+        return solved(tangent)
+    found = kinetic.fitted(start, residual, watched, 1e-9)
+    for one in (start, kinetic.fitted(start, residual, solved, np.inf), found):
+        costs.append(np.sqrt(np.mean(residual(one) ** 2)))
+    # A step that settles at once is the first; the others go on from there.
+    assert costs[2] < 0.5 * costs[1] < 0.5 * costs[0] and len(tangents) > 2
+
+
+def test_a_step_that_makes_it_worse_is_cut_short_or_left_out(kinetic, fitting):
+    residual, _, true = fitting
+    start = 1.2 * true
+
+    heavy = sparse.identity(len(true), format='csr')
+
+    def far(tangent):
+        return start + 3.0 * (true - start), 0.0 * heavy
+    once = kinetic.fitted(start, residual, far, np.inf)
+    assert once == pytest.approx(start + 1.5 * (true - start))
+
+    def wrong(tangent):
+        return start - 4.0 * (true - start), 0.0 * heavy
+    assert kinetic.fitted(start, residual, wrong, np.inf) == pytest.approx(start)
+
+    def dear(tangent):
+        return true, -heavy
+    # What the penalty takes away may count more than what the rows gain.
+    assert kinetic.fitted(start, residual, dear, np.inf) == pytest.approx(start)

@@ -369,3 +369,20 @@ def test_what_the_fitted_rows_hardly_excite_does_not_predict_the_others():
     factors = extrapolated(np.column_stack([known, hardly, 0.0 * known]), trial < 2)
     assert factors == pytest.approx([(known.max() / known[:40].max()) ** 2 - 1.0, 2499.0, 0.0])
     assert extrapolated(hardly[:, None], hardly == 0.0) == pytest.approx([1e6 - 1.0])
+
+
+def test_a_row_of_twice_the_weight_counts_as_two():
+    rng = np.random.default_rng(8)
+    rows, twice = rng.random((40, 6)), np.arange(40) < 15
+    target = rows @ np.array([0.0, 1.0, 0.0, 2.0, 0.5, 0.0]) + 0.4 + 0.1 * rng.standard_normal(40)
+    groups = np.arange(40) % 4
+    repeated = np.r_[np.arange(40), np.flatnonzero(twice)]
+    emphasis = np.sqrt(np.where(twice, 2.0, 1.0) * 40.0 / len(repeated))
+    for strength in (None, 1e-4):
+        once = fit_weights(rows, target, groups=groups, emphasis=emphasis, strength=strength)
+        doubled = fit_weights(rows[repeated], target[repeated], groups=groups[repeated],
+                              strength=strength)
+        assert once.weights == pytest.approx(doubled.weights, abs=1e-9)
+        assert once.bias == pytest.approx(doubled.bias)
+        # Folds are weighted by their rows, not by how much these count.
+        assert once.validation == pytest.approx(doubled.validation, rel=3e-3)
