@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
+from hysteresis_ros.diagnosis.bench_problem import BenchProblem
+from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import bench_tables
@@ -86,3 +89,38 @@ def test_a_row_left_out_is_off_by_more_the_more_rows_the_weights_follow(model, t
     expected = np.sqrt(np.mean((measured - predicted) ** 2)) / (1.0 - np.mean(followed))
     assert problem.left_out_rmse(model.effects) == pytest.approx(expected, rel=0.02)
     assert 0.05 < np.mean(followed) < 0.5
+
+
+def test_effects_are_fitted_to_what_counts(model, tables, monkeypatch):
+    """Lengths of a load as if it were twice as heavy bend the effects, but by its own variance."""
+    fitted = tables[0].select(range(4))
+    columns = {name: np.array(values) for name, values in fitted.columns.items()}
+    third = columns['trial'] == 2.0
+    heavier = Measurement.from_columns(
+        {**columns, 'force': np.where(third, 2.0 * columns['force'], columns['force'])})
+    columns['length'] = np.where(third, model.predict(heavier), columns['length'])
+    table = Measurement.from_columns(columns)
+    bare = dataclasses.replace(model, effects=[], replicates=[])
+    problem = problem_for(bare, [table])
+    effects = BenchFitter(problem.finer()).fit(model.effects).effects
+    balanced = problem.balanced(effects).finer()
+
+    def cost(found):
+        return np.mean((balanced.emphasis * (balanced.measured - balanced.simulate(found))) ** 2)
+    assert cost(BenchFitter(balanced).fit(effects).effects) < 0.99 * cost(effects)
+
+    # With next to no weight on it they are those of the others.
+    balanced.emphasis = np.where(balanced.trial == 2, 1e-4, 1.0)
+    rows = balanced.trial != 2
+    alone = BenchFitter(balanced).fit(effects)
+    without = Response(balanced, [], effects, rows)
+    expected = without.fit(without.minimise(without.parameters.vector(), 8, 1e-3))
+    assert alone.effects[0].C == pytest.approx(expected.effects[0].C, rel=3e-3)
+    assert abs(effects[0].C / expected.effects[0].C - 1.0) > 0.01
+
+    def off_elsewhere():
+        found = extended_model(bare, USUAL, [table])[0]
+        return np.std((found.predict(table) - columns['length'])[~third])
+    balanced_model = off_elsewhere()
+    monkeypatch.setattr(BenchProblem, 'balanced', lambda problem, *_: problem)
+    assert balanced_model < 0.8 * off_elsewhere()
