@@ -80,13 +80,12 @@ def test_a_row_left_out_is_off_by_more_the_more_rows_the_weights_follow(model, t
     problem = problem_of(model, tables)
     predicted = problem.simulate(model.effects)
     step, followed = 1e-7, []
-    measured = problem.measured.copy()
-    for row in range(len(measured)):
-        problem.measured = measured.copy()
-        problem.measured[row] += step
+    for row, measured in enumerate(problem.measured.copy()):
+        problem.measured[row] = measured + step
         followed.append((problem.simulate(model.effects) - predicted)[row] / step)
-    problem.measured = measured
-    expected = np.sqrt(np.mean((measured - predicted) ** 2)) / (1.0 - np.mean(followed))
+        problem.measured[row] = measured
+    error = np.sqrt(np.mean((problem.measured - predicted) ** 2))
+    expected = error / (1.0 - np.mean(followed))
     assert problem.left_out_rmse(model.effects) == pytest.approx(expected, rel=0.02)
     assert 0.05 < np.mean(followed) < 0.5
 
@@ -110,7 +109,7 @@ def test_effects_are_fitted_to_what_counts(model, tables, monkeypatch):
     assert cost(BenchFitter(balanced).fit(effects).effects) < 0.99 * cost(effects)
 
     # With next to no weight on it they are those of the others.
-    balanced.emphasis = np.where(balanced.trial == 2, 1e-4, 1.0)
+    balanced = balanced.with_emphasis(np.where(balanced.trial == 2, 1e-4, 1.0))
     rows = balanced.trial != 2
     alone = BenchFitter(balanced).fit(effects)
     without = Response(balanced, [], effects, rows)

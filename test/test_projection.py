@@ -3,7 +3,7 @@
 """Weights eliminated from a fit: their derivatives, and the rows that they are fitted to."""
 
 from hysteresis_ros.bicep import BicepGeometry
-from hysteresis_ros.diagnosis import bench_problem
+from hysteresis_ros.diagnosis import bench_weights
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.identification import nonnegative
@@ -76,13 +76,13 @@ def test_weights_are_refitted_to_what_the_models_second_stage_is_given(problem):
 def test_a_load_held_out_is_not_predicted_by_what_the_others_hardly_excite(problem, monkeypatch):
     """The heaviest load goes through inputs that the others reach the edge of."""
     held, train = problem.finer().holding_out(), problem.trial != 3
-    hardly = nonnegative.extrapolated(held._design([]).shares, train) > 100.0
+    hardly = nonnegative.extrapolated(held._weights.design([], None).shares, train) > 100.0
 
     def taken():
         return np.sum(held.solve([], train).weights.z[hardly])
 
     own = taken()
-    monkeypatch.setattr(bench_problem, 'extrapolated', lambda shares, train: np.zeros(
+    monkeypatch.setattr(bench_weights, 'extrapolated', lambda shares, train: np.zeros(
         shares.shape[1]))
     assert 0.0 <= own < 0.01 * taken()
 

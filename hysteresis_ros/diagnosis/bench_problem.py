@@ -16,24 +16,19 @@ import functools
 from typing import Literal, TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from hysteresis_ros.diagnosis.bench_courses import BenchCourses
-from hysteresis_ros.diagnosis.bench_design import (
-    Course, Design, Feedback, operator_with, weight_sizes)
+from hysteresis_ros.diagnosis.bench_design import Design, operator_with, weight_sizes
+from hysteresis_ros.diagnosis.bench_weights import BenchWeights, Solution
 from hysteresis_ros.diagnosis.problem import Problem
 from hysteresis_ros.diagnosis.significance import surely_larger, typical_error
-from hysteresis_ros.effects import Effect, needs_phase, SensorEffect
+from hysteresis_ros.effects import Effect, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench_metrics import drive_slope, left_out
 from hysteresis_ros.identification.grid import FOLLOWING
-from hysteresis_ros.identification.kinetic_weights import KineticWeights, Tangent
 from hysteresis_ros.identification.least_squares import SLACK, fit_weights
-from hysteresis_ros.identification.nonnegative import extrapolated, part_of, solve
-from hysteresis_ros.identification.projection import ProjectedWeights
+from hysteresis_ros.identification.nonnegative import solve
 from hysteresis_ros.identification.smoothness import smoothness
-from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.model.kinetic_stage import cold_input, with_kinetics
 from hysteresis_ros.operators import Preisach
 from hysteresis_ros.workers import map_in_forks
 
@@ -42,17 +37,11 @@ if TYPE_CHECKING:
     from hysteresis_ros.measurements import Measurement
     from hysteresis_ros.model import MuscleModel
 
-# Strength of the weights' regularisation at which sets of effects are compared: only so much that
-# the solution is unique. More of it bends the effects' own parameters.
-SEARCH_STRENGTH = 3e-9
-# The same for weights that predict rows held out: more of it widens a steep loop, which under a
-# load that was not fitted counts as the error of the effects.
+# Strength of the regularisation of weights that predict rows held out: more of it widens a steep
+# loop, which under a load that was not fitted counts as the error of the effects.
 HELD_OUT_STRENGTH = 1e-9
 # How often weights and their feedback are fitted to each other.
 PASSES = 2
-# Weights and kinetics are fitted to each other until the response changes by less than this share
-# of its spread.
-SETTLED = 3e-4
 # A finer grid has to lower the held-out error by this share.
 WORTH = 0.02
 # How much finer than the model's the grid of H2 may be once its effects are known.
@@ -70,26 +59,8 @@ JUDGED = 1.5
 JUDGED_EVEN = 2.0
 
 
-@dataclasses.dataclass
-class Solution:
-    """Effects with the weights that suit the training rows best, and what both predict (n,)."""
-
-    weights: ProjectedWeights
-    predicted: np.ndarray
-    feedback: Feedback | None
-
-
 class BenchProblem(Problem):
-    """
-    Bench tables, with weights refitted to the training rows for every set of effects.
-
-    Attributes
-    ----------
-    levels : int
-        Of the grid of H2.
-    emphasis : ndarray, shape (n,)
-        By how much the error of each row counts in the fits; see `balanced`.
-    """
+    """Bench tables, with weights refitted to the training rows for every set of effects."""
 
     refits: Literal[True] = True
 
@@ -100,66 +71,61 @@ class BenchProblem(Problem):
             raise MeasurementError(f'effects on bench tables need a Preisach length stage, this '
                                    f'model has a {stage.kind} one; identify it with --operator '
                                    'two-stage or preisach')
-        self.levels = self._levels_of_model = len(stage.nodes) - 1
+        self._levels_of_model = len(stage.nodes) - 1
         self._surroundings = model.surroundings
         self._transforms = model.surroundings.drive != 'pressure'
         trials = [trial for simulator in self.simulators for trial in simulator.trials]
         begins = np.cumsum([0] + [simulator.measurement.rows for simulator in self.simulators])
-        self._courses = BenchCourses(
+        courses = BenchCourses(
             model, trials,
             np.concatenate([begin + chosen for begin, chosen in zip(begins, self.chosen)]),
             self.measured, self.trial, FOLLOWING if self._transforms else 0.0)
+        self._weights = BenchWeights(model, courses, self.measured, self._levels_of_model)
+        self._holding_out: BenchProblem | None = None
         loads = np.array([np.mean(trial.load) for trial in trials])
         # Which load each trial has, shape (trials,); those that count as the same are equal.
         self._load_of_trial = np.round(loads / max(SAME_LOAD * np.ptp(loads), 1e-12))
-        self._strength = SEARCH_STRENGTH
-        self.emphasis = np.ones(len(self.measured))
-        self._forget()
 
-    def _forget(self) -> None:
-        """Begin without anything that was computed before."""
-        self._holding_out: BenchProblem | None = None
-        self._passive: dict[tuple | None, np.ndarray] = {}
-        self._phases_of: tuple | None = None
-        self._known_phases: list[np.ndarray] = []
-        self._kinetic_z: np.ndarray | None = None
+    def _with(self, weights: BenchWeights) -> BenchProblem:
+        """Return the same rows with weights that are sought in another way."""
+        other = copy.copy(self)
+        other._weights, other._holding_out = weights, None
+        return other
+
+    @property
+    def levels(self) -> int:
+        """Of the grid of H2."""
+        return self._weights.levels
+
+    @property
+    def emphasis(self) -> np.ndarray:
+        """By how much the error of each row counts in the fits, shape (n,); see `balanced`."""
+        return self._weights.emphasis
+
+    def with_emphasis(self, emphasis: np.ndarray) -> BenchProblem:
+        """Return the same with rows whose errors count by another amount (n,)."""
+        return self._with(self._weights.like(emphasis=emphasis))
 
     def finer(self) -> BenchProblem:
         """Return the same rows with H2 on the grid on which sets of effects are judged."""
-        other = copy.copy(self)
-        other.levels = round(
-            (JUDGED if self._transforms else JUDGED_EVEN) * self._levels_of_model)
-        other._forget()
-        return other
+        return self._with(self._weights.like(levels=round(
+            (JUDGED if self._transforms else JUDGED_EVEN) * self._levels_of_model)))
 
     def apart(self) -> BenchProblem:
         """Return the same, from whose work this one does not learn; what is known, it shares."""
-        other = copy.copy(self)
-        other._passive = dict(self._passive)
-        other._courses = self._courses.apart()
+        other = self._with(self._weights.apart())
         if self._holding_out is not None:
             other._holding_out = self._holding_out.apart()
         return other
 
     def begin_near(self, passive: np.ndarray | None) -> None:
-        """
-        Let weights be sought near others first, whatever was found before.
-
-        Parameters
-        ----------
-        passive : ndarray of bool, shape (K + 1,), or None
-            Those of a neighbouring problem that are not at their bound, and the bias.
-        """
-        self._passive = {} if passive is None else {None: passive}
-        self._kinetic_z = None
+        """Let weights be sought near others first; see `BenchWeights.begin_near`."""
+        self._weights.begin_near(passive)
 
     def holding_out(self) -> BenchProblem:
         """Return the same rows and grid, with weights regularised as for rows held out."""
         if self._holding_out is None:
-            other = copy.copy(self)
-            other._strength = HELD_OUT_STRENGTH
-            other._forget()
-            self._holding_out = other
+            self._holding_out = self._with(self._weights.like(strength=HELD_OUT_STRENGTH))
         return self._holding_out
 
     def balanced(self, effects: Sequence[Effect], train: np.ndarray | None = None
@@ -182,11 +148,9 @@ class BenchProblem(Problem):
         squares = (self.measured - self.finer().simulate(effects, train))[rows] ** 2
         variance = np.bincount(fold, weights=squares) / np.maximum(np.bincount(fold), 1)
         weight = 1.0 / np.maximum(variance[fold], self.small_error ** 2)
-        other = copy.copy(self)
-        other.emphasis = np.ones(len(rows))
-        other.emphasis[rows] = np.sqrt(weight / np.mean(weight))
-        other._forget()
-        return other
+        emphasis = np.ones(len(rows))
+        emphasis[rows] = np.sqrt(weight / np.mean(weight))
+        return self.with_emphasis(emphasis)
 
     @functools.cached_property
     def loads_return(self) -> bool:
@@ -233,101 +197,6 @@ class BenchProblem(Problem):
         loads = self._load_of_trial
         return loads[self.trial] if len(np.unique(loads)) > 1 else self.trial
 
-    def _design(self, effects: Sequence[Effect], levels: int | None = None,
-                train: np.ndarray | None = None, feedback: Feedback | None = None,
-                columns: np.ndarray | None = None) -> Design:
-        levels = levels or self.levels
-        feedback = feedback or self._feedback(effects, train, levels)
-        course = self._courses.of(effects, feedback)
-        scale, known = self._courses.judged(course)
-        shares = course.excitation.shares(levels, scale, columns)
-        if feedback is not None and feedback.kinetics is not None:
-            rows, constant = feedback.kinetics
-            part = course.kinetics * scale
-            shares = shares + part[:, None] * (rows if columns is None else rows[:, columns])
-            known = known + part * constant
-        return Design(shares, known, course.excitation.nodes(levels),
-                      course.excitation.smoothness(levels))
-
-    def _feedback(self, effects: Sequence[Effect], train: np.ndarray | None, levels: int
-                  ) -> Feedback | None:
-        """Return what the best weights do that they depend on; None where it is nothing."""
-        phases = self._phases(effects, train) if needs_phase(effects) else None
-        if Chain(effects, self._surroundings).kinetics > 0.0:
-            return Feedback(phases, self._kinetics(effects, train, phases, levels))
-        return None if phases is None else Feedback(phases, None)
-
-    def _kinetics(self, effects: Sequence[Effect], train: np.ndarray | None,
-                  phases: list[np.ndarray] | None, levels: int) -> Tangent:
-        """Return what kinetics of all of the wire add to H2 near its best weights."""
-        plain = Feedback(phases, None)
-        design = self._design(effects, levels, feedback=plain)
-        course = self._courses.of(effects, plain)
-        kinetic = self._added_by_kinetics(effects, course, design.nodes)
-        part = course.kinetics * self._courses.judged(course)[0]
-        rows = slice(None) if train is None else train
-
-        def residual(z: np.ndarray) -> np.ndarray:
-            predicted = design.shares @ z + design.known + part * kinetic.added(z)
-            return (self.emphasis * (self.measured - predicted))[rows]
-
-        def solved(tangent: Tangent) -> tuple[np.ndarray, sparse.csr_matrix]:
-            near = self._design(effects, levels, feedback=Feedback(phases, tangent))
-            return self._projected(near, train).z, self._penalty(near, train)
-
-        # Neighbouring parameters, and neighbouring rows, have neighbouring weights.
-        if self._kinetic_z is None or len(self._kinetic_z) != design.shares.shape[1]:
-            self._kinetic_z = self._projected(design, train).z
-        self._kinetic_z = kinetic.fitted(
-            self._kinetic_z, residual, solved, SETTLED * float(np.std(self.measured)))
-        return kinetic.tangent(self._kinetic_z)
-
-    def _added_by_kinetics(self, effects: Sequence[Effect], course: Course, nodes: np.ndarray
-                           ) -> KineticWeights:
-        """Return what kinetics of all of the wire add to H2 on a grid."""
-        top = cold_input(self.model, Chain(effects, self._surroundings), float(nodes[0]),
-                         float(nodes[-1]))
-        return course.excitation.kinetic(len(nodes) - 1, top)
-
-    def _phases(self, effects: Sequence[Effect], train: np.ndarray | None) -> list[np.ndarray]:
-        """
-        Return the martensite share in every row of each trial.
-
-        As a fit of those effects that do not depend on it predicts it from the inputs; the
-        measured response would let an effect that follows the share predict rows from themselves.
-        """
-        effects = [effect for effect in effects if not effect.needs_phase]
-        key = (None if train is None else train.tobytes(),
-               *((effect.id, *effect.values.items()) for effect in effects))
-        if key != self._phases_of:
-            feedback = self._feedback(effects, train, self.levels)
-            design = self._design(effects, train=train, feedback=feedback)
-            stage = _operator(design, self._projected(design, train).z)
-            self._known_phases = self._phases_with(effects, stage, feedback)
-            self._phases_of = key
-        return self._known_phases
-
-    def _phases_with(self, effects: Sequence[Effect], stage: Preisach, feedback: Feedback | None
-                     ) -> list[np.ndarray]:
-        """Return the martensite share that an H2 shows in every row of each trial."""
-        model = dataclasses.replace(self.model, length_stage=stage)
-        whole = with_kinetics(self.model, Chain(effects, self._surroundings), stage)
-        course = self._courses.of(effects, feedback)
-        return [model.martensite(output) for output in self._courses.outputs(course, whole)]
-
-    def _feedback_with(self, effects: Sequence[Effect], fit: WeightFit, design: Design,
-                       feedback: Feedback) -> Feedback:
-        """Return the feedback of an H2, of the kinds that that of another one has."""
-        z = np.append(fit.weights * weight_sizes(design.nodes), fit.bias)
-        phases = feedback.phases
-        if phases is not None:
-            phases = self._phases_with(effects, _operator(design, z), feedback)
-        if feedback.kinetics is None:
-            return Feedback(phases, None)
-        course = self._courses.of(effects, Feedback(phases, None))
-        kinetic = self._added_by_kinetics(effects, course, design.nodes)
-        return Feedback(phases, kinetic.tangent(z))
-
     def fit_stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray | None = None
                   ) -> tuple[WeightFit, Design]:
         """
@@ -350,16 +219,17 @@ class BenchProblem(Problem):
         groups = self.trial[rows]
         if len(np.unique(groups)) == 1:
             groups = self.block[rows]
-        feedback = self._feedback(effects, train, levels)
+        feedback = self._weights.feedback(effects, train, levels)
         for remaining in range(PASSES if feedback else 0, -1, -1):
-            design = self._design(effects, levels, feedback=feedback)
+            design = self._weights.design(effects, feedback, levels)
             fit = fit_weights(
                 design.rows[rows], (self.measured - design.known)[rows], groups=groups,
                 scale=weight_sizes(design.nodes), slack=SLACK,
                 penalty=smoothness(design.nodes, reversible=True), emphasis=self.emphasis[rows])
             if remaining and feedback:
                 # That of these weights, which are smoother, is not quite the same.
-                feedback = self._feedback_with(effects, fit, design, feedback)
+                z = np.append(fit.weights * weight_sizes(design.nodes), fit.bias)
+                feedback = self._weights.feedback_of(effects, design, z, feedback)
         return fit, design
 
     def stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray) -> Preisach:
@@ -382,75 +252,23 @@ class BenchProblem(Problem):
         train : ndarray of bool, shape (n,), optional
             Rows to fit; all by default.
         """
-        feedback = self._feedback(effects, train, self.levels)
-        design = self._design(effects, feedback=feedback)
-        weights = self._projected(design, train)
-        return Solution(weights, self._response(effects, design, weights.z), feedback)
+        solution = self._weights.solve(effects, train)
+        return dataclasses.replace(
+            solution, predicted=self._sensed(effects, solution.predicted))
 
     def near(self, solution: Solution, effects: Sequence[Effect],
              train: np.ndarray | None = None) -> np.ndarray:
-        """
-        Return the response for effects that differ a little from those of a solution.
+        """Return the response for effects near those of a solution; see `BenchWeights.near`."""
+        return self._sensed(effects, self._weights.near(solution, effects, train))
 
-        Weights that are zero stay so, and so does the feedback.
-
-        Parameters
-        ----------
-        solution : Solution
-        effects : sequence of Effect
-            The same effects with other values.
-        train : ndarray of bool, shape (n,), optional
-            The rows that the solution was fitted to.
-        """
-        columns = solution.weights.columns
-        design = self._design(effects, feedback=solution.feedback, columns=columns)
-        penalty = self._strength * part_of(design.smoothness, columns)
-        penalty.flat[::len(columns) + 1] += self._further(design, train) * np.diag(penalty)
-        z = solution.weights.moved(*self._rows(design, train), penalty)
-        return self._response(effects, design, z)
-
-    def _response(self, effects: Sequence[Effect], design: Design, z: np.ndarray) -> np.ndarray:
-        response = design.shares @ z + design.known
+    def _sensed(self, effects: Sequence[Effect], response: np.ndarray) -> np.ndarray:
+        """Return what sensors show of a response (n,)."""
         for effect in effects:
             if isinstance(effect, SensorEffect):
-                response = self._sensed(effect, response)
+                response = self._sensed_with(effect, response)
         return response
 
-    def _rows(self, design: Design, train: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        """Return design and target of the training rows."""
-        rows, target = self.emphasis[:, None] * design.shares, self.emphasis * (
-            self.measured - design.known)
-        return (rows, target) if train is None else (rows[train], target[train])
-
-    def _further(self, design: Design, train: np.ndarray | None) -> np.ndarray:
-        """
-        Return by what share more each weight of a design is penalised; see `extrapolated`.
-
-        A transformation ends; a muscle that does not transform goes on as it did.
-        """
-        shares = design.shares
-        if train is None or not self._transforms:
-            return np.zeros(shares.shape[1])
-        return extrapolated(shares, train)
-
-    def _projected(self, design: Design, train: np.ndarray | None) -> ProjectedWeights:
-        # Neighbouring parameters have neighbouring weights, on the same grid.
-        key = len(design.nodes), None if train is None else train.tobytes()
-        start = self._passive.get(key, self._passive.get(None))
-        if start is not None and len(start) != design.shares.shape[1]:
-            start = None
-        found = ProjectedWeights(*self._rows(design, train), self._penalty(design, train), start)
-        self._passive[key] = found.passive
-        return found
-
-    def _penalty(self, design: Design, train: np.ndarray | None) -> sparse.csr_matrix:
-        penalty = self._strength * design.smoothness
-        if train is not None:
-            penalty += sparse.diags(
-                self._further(design, train) * penalty.diagonal(), format='csr')
-        return penalty
-
-    def _sensed(self, effect: SensorEffect, response: np.ndarray) -> np.ndarray:
+    def _sensed_with(self, effect: SensorEffect, response: np.ndarray) -> np.ndarray:
         sensed = response.copy()
         for trial in np.unique(self.trial):
             rows = self.trial == trial
@@ -472,18 +290,16 @@ class BenchProblem(Problem):
             All effects of the model.
         """
         solution = self.solve(effects)
-        design = self._design(effects, feedback=solution.feedback)
-        columns, count = solution.weights.columns, len(self.measured)
-        rows = design.shares[:, columns]
-        gram = rows.T @ rows / count
-        followed = np.trace(solve(
-            gram + self._strength * part_of(design.smoothness, columns), gram))
+        rows, penalty = self._weights.free_rows(solution, effects)
+        gram = rows.T @ rows / len(rows)
+        followed = np.trace(solve(gram + penalty, gram)) / len(rows)
         residual = self.measured - solution.predicted
-        return float(np.sqrt(np.mean(residual ** 2)) / (1.0 - followed / count))
+        return float(np.sqrt(np.mean(residual ** 2)) / (1.0 - followed))
 
     def weight_columns(self, effects: Sequence[Effect]) -> np.ndarray:
         """Return how each weight of H2 moves the response of the judged rows, shape (n, K)."""
-        return self._design(effects).rows
+        return self._weights.design(
+            effects, self._weights.feedback(effects, None, self.levels)).rows
 
     def completed(self, effects: Sequence[Effect]) -> MuscleModel:
         """
@@ -505,8 +321,3 @@ class BenchProblem(Problem):
         found.metrics = {**found.metrics, 'length': {**found.metrics.get('length', {}), **left_out(
             fit, self.measured, self.trial, self.signals.get('load'), slope)}}
         return found
-
-
-def _operator(design: Design, z: np.ndarray) -> Preisach:
-    """Return H2 with weights (K + 1,) times the sizes of their cells, its bias aside."""
-    return operator_with(design.nodes, z[:-1] / weight_sizes(design.nodes), 0.0)
