@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.bench_design import operator_with
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory.experiments import bench_tables
+from hysteresis_ros.laboratory.plant import bench_of
+from hysteresis_ros.laboratory.sequences import random_moves
 from hysteresis_ros.measurements import Measurement
 
 TRIALS = {'length_trials': range(4), 'force_trials': [0]}
@@ -88,6 +91,48 @@ def test_a_row_left_out_is_off_by_more_the_more_rows_the_weights_follow(model, t
     expected = error / (1.0 - np.mean(followed))
     assert problem.left_out_rmse(model.effects) == pytest.approx(expected, rel=0.02)
     assert 0.05 < np.mean(followed) < 0.5
+
+
+def test_weights_follow_what_lies_between_the_rows():
+    """Better than those that are chosen for trials left out, at voltages that were not fitted."""
+    lengths, forces = (Measurement.from_columns(bench_tables({}, 11, 'lagoudas')[name])
+                       for name in ('length.csv', 'force.csv'))
+    model = add_effects(identify(lengths, forces, **TRIALS).model, lengths, forces,
+                        [*USUAL, 'transformation_slopes'], **TRIALS)[0]
+    fitted = lengths.select(range(4))
+    problem = problem_for(dataclasses.replace(model, effects=[], replicates=[]), [fitted])
+    fit, design = problem.fit_stage(model.effects, problem.levels)
+    by_trials = dataclasses.replace(model, replicates=[], length_stage=operator_with(
+        design.nodes, fit.weights, fit.bias))
+    plant, loads = bench_of(11, muscle='lagoudas'), np.unique(fitted.column('force'))
+    moves = random_moves(4 * 60, np.random.default_rng(4))
+    others = Measurement.from_columns({
+        'trial': np.repeat(np.arange(4.0), 60), 'step': np.tile(np.arange(60.0), 4),
+        'voltage': moves, 'force': np.repeat(loads, 60), 'length': np.concatenate([
+            plant.length_trial(part, load) for part, load in zip(np.split(moves, 4), loads)])})
+
+    def off(one):
+        return np.sqrt(np.mean((one.predict(others) - others.column('length')) ** 2))
+    completed = problem.completed(model.effects)
+    assert off(completed) < 0.8 * off(by_trials)
+    # What trials left out are off by is told by weights that suit these.
+    assert completed.metrics['length']['left_out']['rmse'] <= fit.held_out_rmse
+
+
+def test_weights_of_a_sweep_are_chosen_for_trials_left_out(model, tables):
+    """Its rows leave nothing between them that a finer grid could follow."""
+    problem = problem_of(model, tables)
+    assert problem.steps_over(model.effects)
+    there, loads = np.linspace(0.0, 6.0, 50), np.unique(tables[0].column('force'))
+    fine = {'trial': np.repeat(np.arange(4.0), 100), 'step': np.tile(np.arange(100.0), 4),
+            'voltage': np.tile(np.append(there, there[::-1]), 4), 'force': np.repeat(loads, 100),
+            'length': np.zeros(400)}
+    fine['length'] = model.predict(Measurement.from_columns(fine))
+    bare = dataclasses.replace(model, effects=[], replicates=[])
+    sweep = problem_for(bare, [Measurement.from_columns(fine)])
+    assert not sweep.steps_over(model.effects)
+    assert len(sweep.completed(model.effects).length_stage.nodes) < len(
+        problem.completed(model.effects).length_stage.nodes)
 
 
 def test_effects_are_fitted_to_what_counts(model, tables, monkeypatch):

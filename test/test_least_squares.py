@@ -11,7 +11,8 @@ from scipy import optimize, sparse
 
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.least_squares import (
-    Anchor, fit_weights, folds_of, quick_weights, SLACK, solve_nonnegative, STRENGTHS)
+    Anchor, fit_weights, folds_of, quick_weights, SLACK, solve_nonnegative, STRENGTHS,
+    WEAKER_STRENGTHS)
 from hysteresis_ros.identification.nonnegative import solve_rows
 from hysteresis_ros.identification.nonnegative import extrapolated
 from hysteresis_ros.identification.smoothness import smoothness
@@ -250,6 +251,31 @@ def test_only_strengths_within_the_slack_are_tried():
     assert within == [True] * count + [False] * (len(STRENGTHS) - count) and count > 1
     assert limited.validation == pytest.approx(free.validation[:count], rel=1e-6)
     assert limited.held_out_rmse == limited.validation.min()
+
+
+@pytest.mark.parametrize('noise', [2e-5, 1e-3])
+def test_a_step_left_out_says_how_strong_the_penalty_is(noise):
+    """By the errors of fits without each of them."""
+    nodes, rows, target, groups = preisach_problem(levels=12)
+    target = target + noise * np.random.default_rng(5).normal(size=len(target))
+    options = {'groups': groups, 'scale': cell_areas(nodes), 'penalty': smoothness(nodes)}
+    fit = fit_weights(rows, target, press=True, **options)
+    assert fit.strengths == pytest.approx(WEAKER_STRENGTHS[-len(fit.strengths):])
+    assert fit.held_out_rmse == fit.validation.min()
+    assert fit.strength == fit.strengths[np.argmin(fit.validation)]
+    chosen = fit_weights(rows, target, strength=fit.strength, **options)
+    assert fit.predict(rows) == pytest.approx(chosen.predict(rows), abs=1e-9)
+
+    count, errors = len(target), []
+    for row in range(count):
+        others = np.arange(count) != row
+        # The mean is of one row less, the target's range is the same.
+        one = fit_weights(rows[others], target[others], scale=options['scale'],
+                          penalty=options['penalty'], strength=fit.strength * count / (count - 1))
+        errors.append(one.predict(rows[row]) - target[row])
+    assert fit.held_out_rmse == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=0.1)
+    trials = fit_weights(rows, target, strengths=[fit.strength], **options)
+    assert fit.held_out == pytest.approx(trials.held_out, abs=1e-9)
 
 
 def test_penalty_picks_one_of_many_solutions():

@@ -53,7 +53,7 @@ class Excitation:
     def __init__(self, inputs: np.ndarray, ends: np.ndarray, wanted: np.ndarray,
                  response: np.ndarray, trial: np.ndarray, following: float) -> None:
         self.inputs = inputs
-        self._ends, self._wanted = ends, wanted
+        self._ends, self.wanted = ends, wanted
         self._response, self._trial, self._following = response, trial, following
         self._nodes: dict[int, np.ndarray] = {}
         self._shares: dict[int, np.ndarray] = {}
@@ -63,7 +63,7 @@ class Excitation:
         """Return a grid that is dense where the response varies most, shape (levels + 1,)."""
         if levels not in self._nodes:
             self._nodes[levels] = nodes_along(
-                self.inputs.min(), self.inputs.max(), self.inputs[self._wanted], self._response,
+                self.inputs.min(), self.inputs.max(), self.inputs[self.wanted], self._response,
                 self._trial, levels, self._following)
         return self._nodes[levels]
 
@@ -87,9 +87,9 @@ class Excitation:
         nodes = self.nodes(levels)
         if levels not in self._shares:
             if columns is not None:
-                return shares(nodes, self.inputs, self._ends, self._wanted, scale, columns)
+                return shares(nodes, self.inputs, self._ends, self.wanted, scale, columns)
             self._shares[levels] = shares(
-                nodes, self.inputs, self._ends, self._wanted, np.ones(len(scale)),
+                nodes, self.inputs, self._ends, self.wanted, np.ones(len(scale)),
                 np.arange(len(weight_sizes(nodes)) + 1))
         found = self._shares[levels]
         found = (found if columns is None else found[:, columns]) * scale[:, None]
@@ -100,7 +100,7 @@ class Excitation:
         """Return what kinetics add to the response where all has transformed at an input."""
         plain = self.shares(levels, np.ones(len(self._response)))
         return KineticWeights(
-            self.nodes(levels), self.inputs, self._ends, self._wanted, plain, top)
+            self.nodes(levels), self.inputs, self._ends, self.wanted, plain, top)
 
 
 @dataclasses.dataclass

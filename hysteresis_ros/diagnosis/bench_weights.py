@@ -174,6 +174,19 @@ class BenchWeights:
         design = self.design(effects, solution.feedback, columns=columns)
         return design.shares, self._strength * part_of(design.smoothness, columns)
 
+    def inputs(self, effects: Sequence[Effect], levels: int) -> tuple[np.ndarray, np.ndarray]:
+        """
+        Return the nodes of a grid of H2, shape (levels + 1,), and its input in judged rows (n,).
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        levels : int
+        """
+        excitation = self._courses.of(effects, self.feedback(effects, None, levels)).excitation
+        return excitation.nodes(levels), excitation.inputs[excitation.wanted]
+
     def design(self, effects: Sequence[Effect], feedback: Feedback | None,
                levels: int | None = None, columns: np.ndarray | None = None) -> Design:
         """

@@ -24,7 +24,8 @@ class WeightFit:
     strength : float
         Strength of the penalty; 0 for the paper's plain problem.
     strengths, validation : ndarray, shape (S,)
-        Strengths tried and the held-out RMSE at each, in the unit of the target.
+        Strengths tried and the RMSE of what was left out at each, a trial or a step, in the unit
+        of the target.
     fitted, residual : ndarray, shape (M,)
         Output at the rows of the fit, and output minus target.
     output_range : float
@@ -69,7 +70,7 @@ class WeightFit:
 
     @property
     def held_out_rmse(self) -> float:
-        """RMSE of held-out rows at the strength chosen; NaN if nothing was held out."""
+        """`validation` at the strength chosen; NaN if nothing was held out."""
         return float(np.append(self.validation[self.strengths == self.strength], np.nan)[0])
 
     @property
