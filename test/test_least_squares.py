@@ -278,6 +278,15 @@ def test_a_step_left_out_says_how_strong_the_penalty_is(noise):
     assert fit.held_out == pytest.approx(trials.held_out, abs=1e-9)
 
 
+def test_strengths_too_weak_to_compute_with_are_left_out():
+    nodes, rows, target, _ = preisach_problem()
+    options = {'press': True, 'scale': cell_areas(nodes), 'penalty': smoothness(nodes)}
+    fit = fit_weights(rows, target, strengths=[1e-30, 1e-8], **options)
+    assert fit.strengths == pytest.approx([1e-8])
+    with pytest.raises(IdentificationError, match='use a(?: larger)? strength'):
+        fit_weights(rows, target, strengths=[1e-30], **options)
+
+
 def test_penalty_picks_one_of_many_solutions():
     nodes, rows, target, groups = preisach_problem()
     fit = fit_weights(rows, target, groups=groups, scale=cell_areas(nodes),

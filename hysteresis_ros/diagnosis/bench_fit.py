@@ -155,11 +155,15 @@ class BenchFitter:
         self.problem = problem
         self.fixed = list(problem.model.effects)
 
+    def on(self, problem: BenchProblem) -> BenchFitter:
+        """Return the same with the weights of another problem of these rows."""
+        other = copy.copy(self)
+        other.problem = problem
+        return other
+
     def apart(self) -> BenchFitter:
         """Return the same, from whose fits this one does not learn where to begin others."""
-        other = copy.copy(self)
-        other.problem = self.problem.apart()
-        return other
+        return self.on(self.problem.apart())
 
     def fit(self, effects: Sequence[Effect], evaluations: int = MOST_EVALUATIONS,
             tolerance: float = TOLERANCE) -> Fit:

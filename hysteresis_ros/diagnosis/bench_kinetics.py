@@ -73,6 +73,17 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetic
     if (Kinetics.id in known or not Kinetics.available(surroundings)
             or not _has_minor_loops(problem)):
         return None
+    shown = _shown(fitter, found)
+    finest = problem.finest([*fitter.fixed, *found])
+    if shown is None and finest.levels > problem.levels:
+        # Coarse weights follow fewer minor loops one by one, fine ones less of a steep branch.
+        shown = _shown(fitter.on(finest), found)
+    return shown
+
+
+def _shown(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetics | None:
+    """Return what `shown_kinetics` does, with the weights of one problem."""
+    problem = fitter.problem
     with np.errstate(all='ignore'):
         profile = _Profile(fitter, found)
         profile.evaluate(COARSE[:1])
@@ -85,7 +96,7 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetic
         profile.evaluate(FINE)
         if not profile.proves():
             return None
-        kinetics = Kinetics(surroundings, share=profile.best)
+        kinetics = Kinetics(problem.model.surroundings, share=profile.best)
         kinetics.intervals['share'] = profile.interval()
         own = profile.fitter_with(profile.best)
         fit = profile.fits[profile.best]

@@ -27,7 +27,8 @@ from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench import LEVELS
 from hysteresis_ros.identification.bench_metrics import drive_slope, left_out
 from hysteresis_ros.identification.grid import FOLLOWING
-from hysteresis_ros.identification.least_squares import SLACK, fit_weights
+from hysteresis_ros.identification.least_squares import (
+    fit_weights, SLACK, WEAKER_STRENGTHS)
 from hysteresis_ros.identification.nonnegative import solve
 from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.operators import Preisach
@@ -118,6 +119,20 @@ class BenchProblem(Problem):
         """Return the same rows with H2 on the grid on which sets of effects are judged."""
         return self._with(self._weights.like(levels=round(
             (JUDGED if self._transforms else JUDGED_EVEN) * self._usual_levels)))
+
+    def finest(self, effects: Sequence[Effect]) -> BenchProblem:
+        """
+        Return the same rows with weights that follow steps as closely as those of the last fit may.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            All effects of the model.
+        """
+        if not self.steps_over(effects):
+            return self.finer()
+        return self._with(self._weights.like(
+            levels=round(FINEST * self._usual_levels), strength=float(WEAKER_STRENGTHS[0])))
 
     def apart(self) -> BenchProblem:
         """Return the same, from whose work this one does not learn; what is known, it shares."""
