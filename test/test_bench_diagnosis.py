@@ -332,6 +332,7 @@ def test_an_extended_model_says_what_was_fitted():
     assert abs(np.mean(error)) < 0.002 * np.ptp(columns['length'])
 
 
+@pytest.mark.long
 def test_the_elasticity_of_the_wire_is_added_to_what_the_bench_proves():
     """Constant loads cannot prove it; on an arm it is needed."""
     model, length, force = clean_bench(3)

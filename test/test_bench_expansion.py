@@ -134,6 +134,7 @@ def test_lengths_that_verify_are_predicted_better_with_it(muscle):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_wire_that_contracts_with_its_temperature_is_said_to():
     """Tanaka's equations: 0.55 MPa/K, 13 GPa when cold and 30 GPa when hot, 97 K at 6 V."""
     tables = bench_tables({}, 8401, 'tanaka')

@@ -195,6 +195,7 @@ def tables(usual):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_identification_adds_them_to_what_the_bench_proves(usual, force, tables, monkeypatch):
     plain = identify(tables, force, **TRIALS).model
     monkeypatch.setattr(

@@ -94,6 +94,7 @@ def test_without_a_shift_nothing_is_begun():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_steep_wire_transforms_where_it_does_and_not_between_other_rows():
     """From the sets that were compared, the fit of this one ends at 0.434 and misses by 1.7 %."""
     tables = experiment_tables('bench', {}, 41000, 'tanaka')
