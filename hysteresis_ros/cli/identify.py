@@ -45,7 +45,8 @@ def add_parser(subparsers: Subparsers) -> argparse.ArgumentParser:
     parser.add_argument('--geometry', type=InputPath, metavar='G.yaml',
                         help='the arm that the muscle will move')
     parser.add_argument('--levels', nargs=2, type=count, default=(10, 20), metavar=('N1', 'N2'),
-                        help='levels of H1 and H2 (default: 10 20)')
+                        help='levels of H1 and H2 (default: 10 20); with effects H2 has a grid of '
+                             'its own, at most 2.5 times as fine as 20')
     parser.add_argument('--operator', choices=OPERATORS,
                         help='default: two-stage with a force table, preisach without a load, '
                         'else what predicts held-out trials better')
