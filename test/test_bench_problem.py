@@ -115,6 +115,10 @@ def test_weights_follow_what_lies_between_the_rows():
         return np.sqrt(np.mean((one.predict(others) - others.column('length')) ** 2))
     completed = problem.completed(model.effects)
     assert off(completed) < 0.8 * off(by_trials)
+    # Those of a replicate are found alike.
+    stage = completed.length_stage
+    again = problem.stage(model.effects, len(stage.nodes) - 1, problem.trial >= 0)
+    assert again.weights == pytest.approx(stage.weights, rel=1e-6, abs=1e-9 * stage.weights.max())
     # What trials left out are off by is told by weights that suit these.
     assert completed.metrics['length']['left_out']['rmse'] <= fit.held_out_rmse
 
