@@ -126,7 +126,7 @@ def test_weights_follow_what_lies_between_the_rows():
 def test_weights_of_a_sweep_are_chosen_for_trials_left_out(model, tables):
     """Its rows leave nothing between them that a finer grid could follow."""
     problem = problem_of(model, tables)
-    assert problem.steps_over(model.effects)
+    assert problem.rows_are_sparse(model.effects)
     there, loads = np.linspace(0.0, 6.0, 50), np.unique(tables[0].column('force'))
     fine = {'trial': np.repeat(np.arange(4.0), 100), 'step': np.tile(np.arange(100.0), 4),
             'voltage': np.tile(np.append(there, there[::-1]), 4), 'force': np.repeat(loads, 100),
@@ -134,7 +134,7 @@ def test_weights_of_a_sweep_are_chosen_for_trials_left_out(model, tables):
     fine['length'] = model.predict(Measurement.from_columns(fine))
     bare = dataclasses.replace(model, effects=[], replicates=[])
     sweep = problem_for(bare, [Measurement.from_columns(fine)])
-    assert not sweep.steps_over(model.effects)
+    assert not sweep.rows_are_sparse(model.effects)
     assert len(sweep.completed(model.effects).length_stage.nodes) < len(
         problem.completed(model.effects).length_stage.nodes)
 

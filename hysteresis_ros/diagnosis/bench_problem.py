@@ -51,9 +51,9 @@ FINER = 1.0, 1.5, 2.0
 # How much finer it is for the weights of all rows. On looked-at wires 2 leaves compensation up to a
 # quarter worse, and 3 to 5 are no better.
 FINEST = 2.5
-# Share of the way of the response from which on rows are steps, not a sweep: of benches 0.89 and
+# Share of the way of the response from which on rows are sparse: of benches in steps 0.89 and
 # more goes past nodes, of sweeps 0.51 at most, with an alloy that transforms within 10 K.
-STEPPED = 0.7
+SPARSE_SHARE = 0.7
 # Share of the response's range below which an error does not matter.
 SMALL_ERROR = 0.01
 # Share of the range of the loads by which two that count as the same may differ.
@@ -129,7 +129,7 @@ class BenchProblem(Problem):
         effects : sequence of Effect
             All effects of the model.
         """
-        if not self.steps_over(effects):
+        if not self.rows_are_sparse(effects):
             return self.finer()
         return self._with(self._weights.like(
             levels=round(FINEST * self._usual_levels), strength=float(WEAKER_STRENGTHS[0])))
@@ -257,7 +257,7 @@ class BenchProblem(Problem):
                 feedback = self._weights.feedback_of(effects, design, z, feedback)
         return fit, design
 
-    def steps_over(self, effects: Sequence[Effect]) -> bool:
+    def rows_are_sparse(self, effects: Sequence[Effect]) -> bool:
         """
         Whether rows are further apart than the nodes of the usual grid, where it matters.
 
@@ -267,11 +267,11 @@ class BenchProblem(Problem):
         nodes, inputs = self._weights.inputs(effects, self._usual_levels)
         passed = np.abs(np.diff(np.searchsorted(nodes, inputs)))
         way = np.abs(np.diff(self.measured)) * (np.diff(self.trial) == 0)
-        return bool(np.sum(way[passed > 1]) > STEPPED * np.sum(way))
+        return bool(np.sum(way[passed > 1]) > SPARSE_SHARE * np.sum(way))
 
     def stage(self, effects: Sequence[Effect], levels: int, train: np.ndarray) -> Preisach:
         """Return H2 as rows to train on (n,) give it, with all effects of the model."""
-        fit, design = self.fit_stage(effects, levels, train, press=self.steps_over(effects))
+        fit, design = self.fit_stage(effects, levels, train, press=self.rows_are_sparse(effects))
         return operator_with(design.nodes, fit.weights, fit.bias)
 
     def simulate(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> np.ndarray:
@@ -279,16 +279,7 @@ class BenchProblem(Problem):
         return self.solve(effects, train).predicted
 
     def solve(self, effects: Sequence[Effect], train: np.ndarray | None = None) -> Solution:
-        """
-        Fit H2's weights with effects as they are.
-
-        Parameters
-        ----------
-        effects : sequence of Effect
-            All effects of the model.
-        train : ndarray of bool, shape (n,), optional
-            Rows to fit; all by default.
-        """
+        """Fit H2's weights with effects as they are; see `BenchWeights.solve`."""
         solution = self._weights.solve(effects, train)
         return dataclasses.replace(
             solution, predicted=self._sensed(effects, solution.predicted))
@@ -354,7 +345,7 @@ class BenchProblem(Problem):
             if other[0].held_out_rmse < (1.0 - WORTH) * fit.held_out_rmse:
                 fit, design = other
         by_trials = fit
-        if self.steps_over(effects):
+        if self.rows_are_sparse(effects):
             fit, design = self.fit_stage(
                 effects, round(FINEST * self._usual_levels), press=True)
         stage = operator_with(design.nodes, fit.weights, fit.bias)

@@ -181,10 +181,11 @@ class BenchWeights:
         Parameters
         ----------
         effects : sequence of Effect
-            All effects of the model.
+            All effects of the model; those that depend on the martensite share are left aside.
         levels : int
         """
-        excitation = self._courses.of(effects, self.feedback(effects, None, levels)).excitation
+        known = [effect for effect in effects if not effect.needs_phase]
+        excitation = self._courses.of(known, None).excitation
         return excitation.nodes(levels), excitation.inputs[excitation.wanted]
 
     def design(self, effects: Sequence[Effect], feedback: Feedback | None,

@@ -155,7 +155,7 @@ def fit_weights(
     if strength is not None:
         return problem.regularised(tried[0])
     if press:
-        return problem.predicting_steps(tried)
+        return problem.regularised_by_press(tried)
     path = problem.path(tried, slack)
     tried = tried[:len(path)]
     errors = problem.held_out_errors(tried, path)
@@ -275,7 +275,7 @@ class _Problem:
             found.append((x, passive))
         return found
 
-    def predicting_steps(self, strengths: np.ndarray) -> WeightFit:
+    def regularised_by_press(self, strengths: np.ndarray) -> WeightFit:
         """Return the fit to all rows with the strength at which a row left out is off least."""
         gram, moment = self._moments(np.ones(len(self.target), dtype=bool))
         found: list[tuple[np.ndarray, np.ndarray]] = []
