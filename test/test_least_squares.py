@@ -287,6 +287,12 @@ def test_strengths_too_weak_to_compute_with_are_left_out():
         fit_weights(rows, target, strengths=[1e-30], **options)
 
 
+def test_a_step_that_alone_determines_a_weight_says_nothing_of_the_strength():
+    fit = fit_weights(np.eye(6), np.arange(1.0, 7.0), press=True, strengths=[1e-20, 1e-3],
+                      anchor=Anchor(np.zeros(6), 0.0))
+    assert np.all(np.isfinite(fit.validation))
+
+
 def test_penalty_picks_one_of_many_solutions():
     nodes, rows, target, groups = preisach_problem()
     fit = fit_weights(rows, target, groups=groups, scale=cell_areas(nodes),
