@@ -336,6 +336,25 @@ def test_one_relaxation_follows_the_martensite(rested):
         made.restore(made.save())
 
 
+@pytest.mark.parametrize('kept', [1.0, 2.0])
+def test_what_had_time_to_creep_on_the_bench_comes_to_it_on_the_arm(kept):
+    """At once a step does the less, by all that its relaxations are to do."""
+    time = np.array([0.1, 0.2, 1.0, 1e6, 1e6 + 0.1])
+    trial = inputs(time, phase=np.array([1.0, 0.4, 0.4, 0.4, np.nan]))
+    made, begun = (effect('creep', c=0.1, t0=3.0, kept=kept, settled=value)
+                   for value in (1.0, 0.0))
+    offset, before = (one.drift(np.full(5, 4.0), np.full(5, 16.0), trial, WIRE)[0]
+                      for one in (made, begun))
+    whole = before[3]
+    np.testing.assert_allclose(offset, before - whole * np.array([0, 1, 1, 1, 1]), atol=1e-9)
+    assert np.all(np.diff(np.abs(offset[1:4])) < 0.0) and abs(offset[3]) < 1e-6 * abs(whole)
+    made.start()
+    for n in range(5):
+        row = Inputs(*(float(column[n]) for column in trial))
+        assert made.advance(4.0, 16.0, row, WIRE)[0] == pytest.approx(offset[n], abs=1e-15)
+        made.restore(made.save())
+
+
 def test_nothing_creeps_before_the_first_step_or_where_the_phase_is_not_known():
     made = effect('creep', c=0.1)
     offset, _ = made.drift(np.zeros(3), np.zeros(3), inputs([1, 9, 99], phase=[1, 1, 1]), WIRE)

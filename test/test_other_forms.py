@@ -9,13 +9,14 @@ from hidden_cases import found_in, TRIALS
 from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.identification.bench import identify
-from hysteresis_ros.laboratory import still_air
+from hysteresis_ros.laboratory import hidden_physics, still_air
 from hysteresis_ros.laboratory.arm import Arm
 from hysteresis_ros.laboratory.conditions import Conditions
 from hysteresis_ros.laboratory.grain_wire import GrainMaterial, GrainWire
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.plant import specimen
+import numpy as np
 import pytest
 from test_transformation_slopes import bench_tables
 
@@ -89,6 +90,28 @@ def test_creep_that_outlasts_its_hold_is_creep(monkeypatch, rested):
     assert (found.verdict, found.missing) == ('missing', ['creep'])
     assert found.effects[0].kept == 2.0 and found.effects[0].rested == rested
     assert found.effects[0].t0 == pytest.approx(90.0, rel=0.2)
+
+
+def test_creep_that_the_bench_had_time_for_is_creep(monkeypatch):
+    """What transforms comes in part at once, and later what is left, in 1.5 to 150 s."""
+    times = 1.5 * 10.0 ** np.arange(0.0, 2.5, 0.5)
+    begin_trial, crept = ParallelWires._begin, {}
+
+    def begin(self):
+        begin_trial(self)
+        crept.clear()
+
+    def otherwise(self, voltage, dt):
+        before = crept.get(self, self._share)
+        crept[self] = self._share + (before - self._share) * np.exp(-dt / times)
+        length = self._conditions.material.resting_length
+        self._creep = 0.02 * length * float(np.mean(crept[self] - self._share))
+    monkeypatch.setattr(ParallelWires, '_begin', begin)
+    monkeypatch.setattr(ParallelWires, '_creep_on', otherwise)
+    found = found_in({'creep': 1.0}, 5, ['creep', 'thermal_lag', 'viscoelastic_creep', 'fatigue'])
+    assert (found.verdict, found.missing) == ('missing', ['creep'])
+    assert (found.effects[0].kept, found.effects[0].settled) == (1.0, 1.0)
+    assert found.rmse_after < 0.2 * found.rmse_before
 
 
 @pytest.mark.parametrize('protocol', [
@@ -196,3 +219,26 @@ def test_loops_that_widen_by_another_law_are_wide_for_the_same_reason():
     before, after = (one.metrics['length']['verification']['model']['mean_percent']
                      for one in (model, extended))
     assert after < 1.0 and after < 0.4 * before
+
+
+def test_muscles_of_which_one_is_as_long_as_told_and_two_are_longer_are_unequal(monkeypatch):
+    def longer(conditions, size, specimen, recording):
+        conditions.wire_offsets = (0.0, 0.0013 * size, 0.0033 * size)
+    monkeypatch.setitem(hidden_physics.EFFECTS, 'unequal_muscles', dataclasses.replace(
+        hidden_physics.EFFECTS['unequal_muscles'], apply=longer))
+    found = found_in({'unequal_muscles': 1.0}, 5, protocol='arm-steps')
+    assert (found.verdict, found.missing) == ('missing', ['unequal_muscles'])
+    offsets = sorted(found.effects[0].offsets)
+    assert np.array(offsets) == pytest.approx([0.0, 0.0013, 0.0033], rel=0.25, abs=2e-4)
+
+
+def test_an_arm_that_swings_slowly_is_heavy(monkeypatch):
+    """A moment of inertia 20 times that of the payload: periods of a second."""
+    def heavy(conditions, size, specimen, recording):
+        conditions.inertia = 0.2
+    monkeypatch.setitem(hidden_physics.EFFECTS, 'inertia', dataclasses.replace(
+        hidden_physics.EFFECTS['inertia'], apply=heavy))
+    names = ['inertia', 'viscous_friction', 'thermal_lag', 'latency']
+    found = found_in({'inertia': 1.0}, 5, names)
+    assert found.verdict == 'missing' and 'inertia' in found.missing
+    assert found.rmse_after < 0.3 * found.rmse_before

@@ -24,7 +24,8 @@ class Creep(MaterialEffect):
                 'martensite share by it, g(dxi) = dxi, or tanh(dxi / s) / tanh(1 / s); and that of '
                 'the steps before, which fades with exp(-2 t / t0); where kept is 1, the '
                 'logarithms of all steps so far, where it is 2, c l0 ln(10) y with '
-                'dy/dt = (xi - y) / t0, less those of the cold muscle if it is not rested')
+                'dy/dt = (xi - y) / t0, less those of the cold muscle if it is not rested; where '
+                'settled is 1, less those of all time, so that the muscle comes to what H2 says')
     source = ("logarithmic creep of what has just transformed; Boltzmann's superposition "
               '(kept = 1); Kelvin and Voigt (kept = 2)')
     shows_in = 'log time in a hold'
@@ -45,13 +46,20 @@ class Creep(MaterialEffect):
                   choices=(0.0, 0.1)),
         Parameter('rested', '1', 'of what goes on, 0: the cold muscle has crept before a trial, '
                   '1: it begins to', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0), kinds=('arm',),
-                  form=True))
+                  form=True),
+        Parameter('settled', '1', 'of what goes on, 0: the bench has what a step does at once, 1: '
+                  'what it comes to in the end', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0),
+                  kinds=('arm',), form=True))
+
+    # Martensite share, less one, that relaxations go to.
+    _target: float
 
     # When the last step was [s], and the drive before; None before a trial.
     _since: float | None
     _drive: float | None
 
-    memory = ('_since', '_drive', '_phase', '_before', '_direction', '_crept', '_carried', '_modes')
+    memory = ('_since', '_drive', '_phase', '_before', '_direction', '_crept', '_carried', '_modes',
+              '_target')
 
     # The logarithm as a sum of relaxations, each this many times slower than the one before.
     MODES, RATIO = 6, 3.0
@@ -74,12 +82,17 @@ class Creep(MaterialEffect):
         self._phase = self._before = 1.0
         self._direction = self._crept = self._carried = 0.0
         self._modes = [-self.rested] * len(self._times())
+        self._target = 0.0
 
     def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
-        """Begin also with a relaxation that outlasts holds of half a minute, and with a rest."""
+        """
+        Begin also with a relaxation that outlasts holds of half a minute, and with a rest.
+
+        And with a muscle whose bench had time to creep.
+        """
         slow = {'c': 0.15, 't0': self.SLOW, 'kept': SINGLE}
         return [{**slow, 'rested': 0.0}, {**slow, 'rested': 1.0},
-                {'c': 0.15, 'kept': 1.0, 'rested': 1.0}]
+                {'c': 0.15, 'kept': 1.0, 'rested': 1.0}, {'c': 0.15, 'kept': 1.0, 'settled': 1.0}]
 
     def advance(self, drive: float, drive_squared: float, inputs: Inputs,
                 surroundings: Surroundings) -> tuple[float, float]:
@@ -144,10 +157,10 @@ class Creep(MaterialEffect):
     def _relax(self, phase: float, dt: float, surroundings: Surroundings) -> float:
         """Bring all relaxations nearer to the phase, and return their strain."""
         if math.isfinite(phase):
-            target = phase - 1.0
+            self._target = target = phase - 1.0
             decays = np.exp(-dt / self._times())
             self._modes = (target + (np.array(self._modes) - target) * decays).tolist()
-        return self._strain_of_modes(sum(self._modes), surroundings)
+        return self._strain_of_modes(sum(self._modes), self._target, surroundings)
 
     def _relaxed(self, inputs: Inputs, surroundings: Surroundings) -> np.ndarray:
         """Return what `_relax` does for a whole trial."""
@@ -157,11 +170,16 @@ class Creep(MaterialEffect):
         targets = np.where(np.isfinite(inputs.phase), inputs.phase - 1.0, np.nan)
         total = relax(targets, np.array(inputs.dt, float), self._times(), modes)
         self._modes = modes.tolist()
-        return self._strain_of_modes(total, surroundings)
+        known = np.maximum.accumulate(np.where(np.isfinite(targets), np.arange(len(targets)), -1))
+        targets = np.where(known < 0, 0.0, targets[known])
+        if len(targets):
+            self._target = float(targets[-1])
+        return self._strain_of_modes(total, targets, surroundings)
 
-    def _strain_of_modes(self, total: Values, surroundings: Surroundings) -> Values:
+    def _strain_of_modes(self, total: Values, target: Values, surroundings: Surroundings) -> Values:
         each = math.log(self.DECADE if self.kept == SINGLE else self.RATIO)
-        strain = self.c / 100.0 * each * (total + self.rested * len(self._modes))
+        before = self.settled * target - (1.0 - self.settled) * self.rested
+        strain = self.c / 100.0 * each * (total - before * len(self._modes))
         return -surroundings.sign * surroundings.length * strain
 
     def _strain(self, change: Values, held: Values, surroundings: Surroundings) -> Values:

@@ -300,10 +300,10 @@ class UnequalMuscles(MaterialEffect):
     experiment = 'run the arm on one muscle at a time'
     confused_with = ('slack', 'geometry_error')
     parameters = (
-        Parameter('shorter', 'mm', 'how much the shortest lacks against the middle one', 0.0, 8.0,
-                  0.0, (0.5, 2.0), scale='length'),
-        Parameter('longer', 'mm', 'how much the longest exceeds the middle one', 0.0, 8.0, 0.0,
-                  (0.5, 2.0), scale='length'),)
+        Parameter('shorter', 'mm', 'how much one lacks against one that is as on the bench', 0.0,
+                  8.0, 0.0, (-1.0, 0.5, 2.0), both_signs=True, scale='length'),
+        Parameter('longer', 'mm', 'how much another one exceeds it', 0.0, 8.0, 0.0,
+                  (-1.0, 0.5, 2.0), both_signs=True, scale='length'),)
 
     @property
     def offsets(self) -> tuple[float, ...]:     # type: ignore[override]
