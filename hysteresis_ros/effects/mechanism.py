@@ -82,8 +82,8 @@ class Inertia(MechanismEffect):
     # another.
     parameters = (
         Parameter('I', 'kg m^2', 'moment of inertia about the pivot', 0.001, 0.6, 0.0,
-                  (0.004, 0.006, 0.009, 0.013, 0.019, 0.028, 0.04, 0.06, 0.09, 0.13, 0.19, 0.28, 0.4),
-                  log=True, scale='inertia'),
+                  (0.004, 0.006, 0.009, 0.013, 0.019, 0.028, 0.04, 0.06, 0.09, 0.13, 0.19, 0.28,
+                   0.4), log=True, scale='inertia'),
         Parameter('b', 'N m s/rad', 'moment per angular velocity, by which the ringing dies away',
                   0.001, 4.0, 0.0, (0.05,), log=True, scale='moment'),)
 
