@@ -80,8 +80,8 @@ def test_what_is_beyond_a_limit_is_out_of_reach():
     assert float(neutral.forward(7.0, ROOM, WIRE)) == neutral.inverse(7.0, ROOM, WIRE) == 7.0
 
 
-@pytest.mark.parametrize('whole, arrives', [(0.0, 2.4), (1.0, 3.0)])
-def test_beyond_a_dead_zone_the_voltage_is_stretched_or_whole(whole, arrives):
+@pytest.mark.parametrize('whole, arrives', [(0.0, 2.4), (1.0, 3.0), (2.0, 2.0)])
+def test_beyond_a_dead_zone_the_voltage_is_stretched_or_whole_or_lower(whole, arrives):
     made = effect('pwm_dead_zone', Vd=1.0, whole=whole)
     rows = made.forward(np.array([-1.0, 0.0, 0.999, 3.0]), ROOM, WIRE)
     np.testing.assert_allclose(rows[1:], [0.0, 0.0, arrives], rtol=1e-12)
@@ -95,12 +95,17 @@ def test_between_nothing_and_a_whole_pulse_the_nearer_one_in_heat_is_set():
         -1.0, 0.0, 0.0, 2.0, 2.0, 2.5]
 
 
-@pytest.mark.parametrize('whole, largest', [(0.0, 1.5), (1.0, 4.0)])
+@pytest.mark.parametrize('whole, largest', [(0.0, 1.5), (1.0, 4.0), (2.0, 1.5)])
 def test_pulses_that_arrive_whole_may_drop_out_further_up(whole, largest):
     odd = [effect('pwm_dead_zone', Vd=share * largest, whole=whole).implausible(0.15)
            for share in (0.01, 1.1, 1.2)]
     assert odd[1:] == [[], ['Vd']]
-    assert odd[0] == ([] if whole else ['Vd'])
+    assert odd[0] == ([] if whole == 1.0 else ['Vd'])
+
+
+def test_a_loss_at_any_duty_is_rarer_than_what_looks_like_it():
+    odds = [effect('pwm_dead_zone', Vd=0.3, whole=whole).prior_odds for whole in (0.0, 1.0, 2.0)]
+    assert odds[:2] == [1.0, 1.0] and 0.0 < odds[2] < 1.0 == effect('supply_sag').prior_odds
 
 
 def test_dead_zone_as_wide_as_the_range_stays_finite():

@@ -52,6 +52,13 @@ def test_of_each_set_the_most_probable_fit_is_kept(fitter, sets):
         sets.fits.clear()
 
 
+def test_an_effect_in_a_rarer_form_is_less_probable_by_its_odds(fitter, sets, monkeypatch):
+    sets.keep(fitted(fitter))
+    usual = sets.log_posterior(NAMES)
+    monkeypatch.setattr(catalogue()['payload_error'], 'prior_odds', 0.1)
+    assert sets.log_posterior(NAMES) == pytest.approx(usual + np.log(0.1))
+
+
 def test_the_error_of_a_set_is_the_smallest_that_was_found(fitter, sets):
     """Also where a smaller one is found after it was asked for, and no larger one counts."""
     sets.keep(fitted(fitter))

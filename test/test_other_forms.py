@@ -174,6 +174,23 @@ def test_pulses_that_drop_out_and_pass_whole_above_are_a_dead_zone(monkeypatch):
     assert found.effects[0].Vd == pytest.approx(3.6, rel=0.1)
 
 
+def test_what_does_not_switch_at_any_duty_is_a_dead_zone(monkeypatch):
+    """Nearly a shift of the transformation, or a sag, to a settled arm, and rarer than these."""
+    drive_squared = Conditions.drive_squared
+
+    def otherwise(own, voltage, *others):
+        dead, own.dead_voltage = own.dead_voltage, 0.0
+        found = drive_squared(own, max(voltage - (0.3 if dead else 0.0), 0.0), *others)
+        own.dead_voltage = dead
+        return found
+    monkeypatch.setattr(Conditions, 'drive_squared', otherwise)
+    names = ['pwm_dead_zone', 'stress_dependence', 'supply_sag', 'ambient_drift']
+    found = found_in({'pwm_dead_zone': 1.0}, 5, names, protocol='arm-steps', trials=(0, 1))
+    assert (found.verdict, found.missing) == ('missing', ['pwm_dead_zone'])
+    assert found.effects[0].whole == 2.0
+    assert found.effects[0].Vd == pytest.approx(0.3, rel=0.2)
+
+
 def test_a_limited_current_is_a_limit_of_the_supply():
     """In a settled arm that is nearly an end stop, but for minor loops on cooling."""
     found = found_in({'supply_limit': 1.0}, 5, protocol='arm-steps', trials=(0, 1))

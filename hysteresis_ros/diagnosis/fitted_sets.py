@@ -123,7 +123,8 @@ class FittedSets:
         """
         fit = self.fits[names]
         acting = len(names) + sum(bool(effect.replaces) for effect in fit.effects)
-        return fit.log_evidence / self.temper + self.odds * acting
+        rarer = sum(math.log(effect.prior_odds) for effect in fit.effects)
+        return fit.log_evidence / self.temper + self.odds * acting + rarer
 
     def ranked(self) -> list[frozenset[str]]:
         """Return all sets that were fitted, most probable first."""

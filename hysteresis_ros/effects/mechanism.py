@@ -81,9 +81,9 @@ class Inertia(MechanismEffect):
     # Starts are so near each other because a fit finds no way from one period of the ringing to
     # another.
     parameters = (
-        Parameter('I', 'kg m^2', 'moment of inertia about the pivot', 0.001, 0.6, 0.0,
-                  (0.004, 0.006, 0.009, 0.013, 0.019, 0.028, 0.04, 0.06, 0.09, 0.13, 0.19, 0.28,
-                   0.4), log=True, scale='inertia'),
+        Parameter('I', 'kg m^2', 'moment of inertia about the pivot', 0.001, 1.2, 0.0,
+                  (0.004, 0.006, 0.009, 0.0135, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.23, 0.35,
+                   0.52, 0.8), log=True, scale='inertia'),
         Parameter('b', 'N m s/rad', 'moment per angular velocity, by which the ringing dies away',
                   0.001, 4.0, 0.0, (0.05,), log=True, scale='moment'),)
 
