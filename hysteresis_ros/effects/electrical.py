@@ -90,8 +90,8 @@ class PwmDeadZone(ElectricalEffect):
     CUTS = tuple(0.8 * 1.05 ** step for step in range(25))
     # The same for what is lost at any duty.
     LOSSES = 0.1, 0.4
-    # Prior odds of that: a sag and a shift are more usual, and nearly the same to an arm. Of 40 arms
-    # of this laboratory with one of these, and of 40 of one that is not ours with seven such
+    # Prior odds of that: a sag and a shift are more usual, and nearly the same to an arm. Of 40
+    # arms of this laboratory with one of these, and of 40 of one that is not ours with seven such
     # losses, the names are in the set in 39 and 38 (first 34 and 31) with odds of 1, in 40 and 37
     # with 0.1 (36 and 29) and 0.05 (38 and 29), in 40 and 36 with 0.02 (39 and 29).
     RARE = 0.05
