@@ -80,6 +80,20 @@ def test_what_is_beyond_a_limit_is_out_of_reach():
     assert float(neutral.forward(7.0, ROOM, WIRE)) == neutral.inverse(7.0, ROOM, WIRE) == 7.0
 
 
+def test_a_limit_that_is_reached_gradually_leaves_small_voltages_whole():
+    """And is never passed; what it gives can be undone, up to there."""
+    made = effect('supply_limit', cut=1.0, soft=1.0 / 12.0)
+    asked = np.array([-1.0, 0.0, 2.0, 4.0, 5.0, 6.0, 6e9])
+    rows = made.forward(asked, ROOM, WIRE)
+    np.testing.assert_allclose(rows[:4], asked[:4], rtol=6e-3)
+    assert rows[4] == pytest.approx(5.0 * 2.0 ** (-1.0 / 12.0)) and np.all(rows < 5.0 + 1e-12)
+    for wanted, setpoint in zip(rows[:6], asked):
+        assert made.inverse(float(wanted), ROOM, WIRE) == pytest.approx(setpoint, rel=1e-9)
+    assert made.inverse(5.001, ROOM, WIRE) > 6.0
+    nearly = effect('supply_limit', cut=1.0, soft=0.001).forward(asked, ROOM, WIRE)
+    np.testing.assert_array_equal(nearly, np.minimum(asked, 5.0))
+
+
 @pytest.mark.parametrize('whole, arrives', [(0.0, 2.4), (1.0, 3.0), (2.0, 2.0)])
 def test_beyond_a_dead_zone_the_voltage_is_stretched_or_whole_or_lower(whole, arrives):
     made = effect('pwm_dead_zone', Vd=1.0, whole=whole)

@@ -11,7 +11,7 @@ from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory import hidden_physics, still_air
 from hysteresis_ros.laboratory.arm import Arm
-from hysteresis_ros.laboratory.conditions import Conditions
+from hysteresis_ros.laboratory.conditions import Conditions, RESISTANCE
 from hysteresis_ros.laboratory.grain_wire import GrainMaterial, GrainWire
 from hysteresis_ros.laboratory.linkage import GEOMETRY
 from hysteresis_ros.laboratory.parallel_wires import ParallelWires
@@ -196,6 +196,24 @@ def test_a_limited_current_is_a_limit_of_the_supply():
     found = found_in({'supply_limit': 1.0}, 5, protocol='arm-steps', trials=(0, 1))
     assert found.verdict == 'missing' and 'supply_limit' in named(found)
     assert found.rmse_after < 0.4 * found.rmse_before
+
+
+def test_a_supply_that_gives_in_gradually_is_a_limit_of_it(monkeypatch):
+    """Of 4.75 V, with a knee of the fourth order in power."""
+    drive_squared = Conditions.drive_squared
+
+    def otherwise(own, voltage, *others):
+        current, own.largest_current = own.largest_current, math.inf
+        if current < math.inf:
+            voltage *= (1.0 + (voltage / (current * RESISTANCE)) ** 8) ** -0.125
+        found = drive_squared(own, voltage, *others)
+        own.largest_current = current
+        return found
+    monkeypatch.setattr(Conditions, 'drive_squared', otherwise)
+    names = ['supply_limit', 'end_stop', 'supply_sag', 'cold_clamps', 'stress_dependence']
+    found = found_in({'supply_limit': 1.0}, 5, names, protocol='arm-steps', trials=(0, 1))
+    assert (found.verdict, found.missing) == ('missing', ['supply_limit'])
+    assert found.effects[0].soft == pytest.approx(0.125, rel=0.2)
 
 
 class Saturating(float):

@@ -149,22 +149,38 @@ class SupplyLimit(ElectricalEffect):
 
     id = 'supply_limit'
     sentence = 'Beyond a limit the supply gives no more, whatever is set.'
-    equation = 'Ve = min(V, Vmax - cut), Vmax the largest of the bench'
+    equation = ('Ve = min(V, Vl), Vl = Vmax - cut, Vmax the largest of the bench; or, where soft '
+                'is not 0, V / (1 + (V / Vl)^(1/soft))^soft')
     source = 'current limit of a supply, largest duty of a PWM stage'
     shows_in = 'high V: the hot end is not reached'
     experiment = 'measure the voltage at the wire itself while the setpoint rises to the largest'
     confused_with = ('end_stop', 'supply_sag')
     parameters = (
         Parameter('cut', 'V', 'what the limit is below the largest drive of the bench', 0.05, 4.0,
-                  0.0, (0.5, 1.0, 1.5, 2.0, 2.5, 3.0), log=True, scale='drive'),)
+                  0.0, (0.5, 1.0, 1.5, 2.0, 2.5, 3.0), log=True, scale='drive'),
+        Parameter('soft', '1', 'how gradually it is reached, 0: at once', 0.0, 0.2, 0.0,
+                  (0.0, 0.08), limits=(0.0, 0.3), kinds=('arm',), form=True))
+
+    # A knee of a higher order than the inverse of this is none.
+    SHARP = 0.01
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Cut the upper end off."""
-        return np.minimum(signal, self._limit(surroundings)) if self.cut else signal
+        limit = self._limit(surroundings)
+        if self.cut and self.soft > self.SHARP and limit > 0.0:
+            # As 1 + x^n on one side and x (1 + x^-n) on the other, neither of which overflows.
+            over = np.maximum(signal, 0.0) / limit
+            small = np.minimum(over, 1.0 / np.maximum(over, 1e-300))
+            knee = (1.0 + small ** (1.0 / self.soft)) ** -self.soft
+            return np.where(over < 1.0, signal, limit) * knee
+        return np.minimum(signal, limit) if self.cut else signal
 
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Leave what is below the limit; what is beyond it stays out of reach."""
-        return signal if signal <= self._limit(surroundings) else signal + self.cut
+        limit = self._limit(surroundings)
+        if self.cut and self.soft > self.SHARP and 0.0 < signal < limit:
+            return signal * (1.0 - (signal / limit) ** (1.0 / self.soft)) ** -self.soft
+        return signal if signal <= limit else signal + self.cut
 
     def _limit(self, surroundings: Surroundings) -> float:
         return math.sqrt(surroundings.full_drive_squared) - self.cut
