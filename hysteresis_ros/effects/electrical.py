@@ -92,8 +92,8 @@ class PwmDeadZone(ElectricalEffect):
     LOSSES = 0.1, 0.4
     # Prior odds of that: a sag and a shift are more usual, and nearly the same to an arm. Of 40
     # arms of this laboratory with one of these, and of 40 of one that is not ours with seven such
-    # losses, the names are in the set in 39 and 38 (first 34 and 31) with odds of 1, in 40 and 37
-    # with 0.1 (36 and 29) and 0.05 (38 and 29), in 40 and 36 with 0.02 (39 and 29).
+    # losses, the names are in the set in 39 and 40 (first 34 and 33) with odds of 1, in 40 and 39
+    # with 0.1 (36 and 31) and 0.05 (38 and 31), in 40 and 38 with 0.02 (39 and 31).
     RARE = 0.05
 
     def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
