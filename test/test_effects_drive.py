@@ -89,7 +89,8 @@ def test_a_limit_that_is_reached_gradually_leaves_small_voltages_whole():
     assert rows[4] == pytest.approx(5.0 * 2.0 ** (-1.0 / 12.0)) and np.all(rows < 5.0 + 1e-12)
     for wanted, setpoint in zip(rows[:6], asked):
         assert made.inverse(float(wanted), ROOM, WIRE) == pytest.approx(setpoint, rel=1e-9)
-    assert made.inverse(5.001, ROOM, WIRE) > 6.0
+    for beyond in (math.nextafter(5.0, 0.0), 5.0, 5.001):
+        assert 6.0 - 1e-9 <= made.inverse(beyond, ROOM, WIRE) < math.inf
     nearly = effect('supply_limit', cut=1.0, soft=0.001).forward(asked, ROOM, WIRE)
     np.testing.assert_array_equal(nearly, np.minimum(asked, 5.0))
 

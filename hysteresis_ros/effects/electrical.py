@@ -178,8 +178,9 @@ class SupplyLimit(ElectricalEffect):
     def inverse(self, signal: float, inputs: Inputs, surroundings: Surroundings) -> float:
         """Leave what is below the limit; what is beyond it stays out of reach."""
         limit = self._limit(surroundings)
-        if self.cut and self.soft > self.SHARP and 0.0 < signal < limit:
-            return signal * (1.0 - (signal / limit) ** (1.0 / self.soft)) ** -self.soft
+        if self.cut and self.soft > self.SHARP and signal > 0.0:
+            left = 1.0 - (signal / limit) ** (1.0 / self.soft) if 0.0 < signal < limit else 0.0
+            return signal * left ** -self.soft if left > 0.0 else signal + self.cut
         return signal if signal <= limit else signal + self.cut
 
     def _limit(self, surroundings: Surroundings) -> float:
