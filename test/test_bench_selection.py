@@ -388,7 +388,8 @@ def test_every_load_counts_alike_whatever_its_error(selection):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('muscle, seed', [
-    ('lagoudas', 6302), ('lagoudas', 6311), ('brinson', 6353), ('brinson', 6602),
+    ('lagoudas', 6302), pytest.param('lagoudas', 6311, marks=pytest.mark.long),
+    pytest.param('brinson', 6353, marks=pytest.mark.long), ('brinson', 6602),
     ('brinson', 6601), ('brinson', 6708)])
 def test_what_the_load_does_is_named_on_every_specimen_and_no_wear(muscle, seed):
     """

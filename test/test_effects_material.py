@@ -348,11 +348,18 @@ def test_what_had_time_to_creep_on_the_bench_comes_to_it_on_the_arm(kept):
     whole = before[3]
     np.testing.assert_allclose(offset, before - whole * np.array([0, 1, 1, 1, 1]), atol=1e-9)
     assert np.all(np.diff(np.abs(offset[1:4])) < 0.0) and abs(offset[3]) < 1e-6 * abs(whole)
+    # Also where the trial's rows go on one by one.
+    after, _ = made.advance(4.0, 16.0, Inputs(*(float(column[4]) for column in trial)), WIRE)
+    assert after == pytest.approx(offset[4], abs=1e-15)
     made.start()
     for n in range(5):
         row = Inputs(*(float(column[n]) for column in trial))
         assert made.advance(4.0, 16.0, row, WIRE)[0] == pytest.approx(offset[n], abs=1e-15)
         made.restore(made.save())
+    # From which it has begun to creep no longer matters in the end.
+    rested = effect('creep', c=0.1, t0=3.0, kept=kept, settled=1.0, rested=1.0)
+    late, _ = rested.drift(np.full(5, 4.0), np.full(5, 16.0), trial, WIRE)
+    assert late[3] == pytest.approx(offset[3], abs=1e-9) and abs(late[1] - offset[1]) > 1e-5
 
 
 def test_nothing_creeps_before_the_first_step_or_where_the_phase_is_not_known():

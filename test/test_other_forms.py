@@ -198,6 +198,7 @@ def test_a_limited_current_is_a_limit_of_the_supply():
     assert found.rmse_after < 0.4 * found.rmse_before
 
 
+@LONG
 def test_a_supply_that_gives_in_gradually_is_a_limit_of_it(monkeypatch):
     """Of 4.75 V, with a knee of the fourth order in power."""
     drive_squared = Conditions.drive_squared
@@ -267,6 +268,7 @@ def test_muscles_of_which_one_is_as_long_as_told_and_two_are_longer_are_unequal(
     assert np.array(offsets) == pytest.approx([0.0, 0.0013, 0.0033], rel=0.25, abs=2e-4)
 
 
+@LONG
 def test_an_arm_that_swings_slowly_is_heavy(monkeypatch):
     """A moment of inertia 20 times that of the payload: periods of a second."""
     def heavy(conditions, size, specimen, recording):
