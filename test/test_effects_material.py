@@ -355,7 +355,8 @@ def test_what_had_time_to_creep_on_the_bench_comes_to_it_on_the_arm(kept):
     for n in range(5):
         row = Inputs(*(float(column[n]) for column in trial))
         assert made.advance(4.0, 16.0, row, WIRE)[0] == pytest.approx(offset[n], abs=1e-15)
-        made.restore(made.save())
+        state, made = made.save(), effect('creep', c=0.1, t0=3.0, kept=kept, settled=1.0)
+        made.restore(state)
     # From which it has begun to creep no longer matters in the end.
     rested = effect('creep', c=0.1, t0=3.0, kept=kept, settled=1.0, rested=1.0)
     late, _ = rested.drift(np.full(5, 4.0), np.full(5, 16.0), trial, WIRE)
