@@ -93,3 +93,11 @@ def test_what_resists_motion_does_nothing_at_rest(name, expected):
     effect = catalogue()[name](**STRENGTHS[name])
     assert effect.resistance() == expected
     assert effect.forward(REST, GEOMETRY) is REST
+
+
+def test_fits_of_an_inertia_begin_in_every_period_of_the_ringing():
+    """No further apart than a quarter of a period, which goes with the root of the inertia."""
+    inertia = catalogue()['inertia'].parameters[0]
+    starts = np.array(inertia.starts)
+    assert np.all(np.diff(np.log(starts)) < 2.0 * np.log(1.27))
+    assert starts[0] <= 5.0 * inertia.low and starts[-1] >= 0.6 * inertia.high
