@@ -29,6 +29,26 @@ def named(found):
     return {*found.missing, *(name for others in found.alternatives for name in others)}
 
 
+def change_drive(monkeypatch, name, neutral, change):
+    """Let ``change(voltage, value)`` be felt where a condition is not neutral, and not what is."""
+    drive_squared = Conditions.drive_squared
+
+    def otherwise(own, voltage, *others):
+        value = getattr(own, name)
+        setattr(own, name, neutral)
+        found = drive_squared(own, voltage if value == neutral else change(voltage, value), *others)
+        setattr(own, name, value)
+        return found
+    monkeypatch.setattr(Conditions, 'drive_squared', otherwise)
+
+
+def change_condition(monkeypatch, effect, name, value):
+    """Let a hidden effect set one condition to a value, and nothing else."""
+    monkeypatch.setitem(hidden_physics.EFFECTS, effect, dataclasses.replace(
+        hidden_physics.EFFECTS[effect],
+        apply=lambda conditions, *others: setattr(conditions, name, value)))
+
+
 @pytest.fixture
 def harder_to_start(monkeypatch):
     """Dry friction that is half as large again until the arm slides (Stribeck 1902)."""
@@ -160,14 +180,8 @@ def test_heat_that_is_lost_otherwise_than_on_the_bench_is_heat_loss(monkeypatch,
 
 def test_pulses_that_drop_out_and_pass_whole_above_are_a_dead_zone(monkeypatch):
     """No rest of them is stretched."""
-    drive_squared = Conditions.drive_squared
-
-    def otherwise(own, voltage, *others):
-        dead, own.dead_voltage = own.dead_voltage, 0.0
-        found = drive_squared(own, 0.0 if dead and voltage < 3.6 else voltage, *others)
-        own.dead_voltage = dead
-        return found
-    monkeypatch.setattr(Conditions, 'drive_squared', otherwise)
+    change_drive(monkeypatch, 'dead_voltage', 0.0,
+                 lambda voltage, _: 0.0 if voltage < 3.6 else voltage)
     found = found_in({'pwm_dead_zone': 1.0}, 5, protocol='arm-steps', trials=(0, 1))
     assert (found.verdict, found.missing) == ('missing', ['pwm_dead_zone'])
     assert found.effects[0].whole == 1.0
@@ -176,14 +190,7 @@ def test_pulses_that_drop_out_and_pass_whole_above_are_a_dead_zone(monkeypatch):
 
 def test_what_does_not_switch_at_any_duty_is_a_dead_zone(monkeypatch):
     """Nearly a shift of the transformation, or a sag, to a settled arm, and rarer than these."""
-    drive_squared = Conditions.drive_squared
-
-    def otherwise(own, voltage, *others):
-        dead, own.dead_voltage = own.dead_voltage, 0.0
-        found = drive_squared(own, max(voltage - (0.3 if dead else 0.0), 0.0), *others)
-        own.dead_voltage = dead
-        return found
-    monkeypatch.setattr(Conditions, 'drive_squared', otherwise)
+    change_drive(monkeypatch, 'dead_voltage', 0.0, lambda voltage, _: max(voltage - 0.3, 0.0))
     names = ['pwm_dead_zone', 'stress_dependence', 'supply_sag', 'ambient_drift']
     found = found_in({'pwm_dead_zone': 1.0}, 5, names, protocol='arm-steps', trials=(0, 1))
     assert (found.verdict, found.missing) == ('missing', ['pwm_dead_zone'])
@@ -201,16 +208,8 @@ def test_a_limited_current_is_a_limit_of_the_supply():
 @LONG
 def test_a_supply_that_gives_in_gradually_is_a_limit_of_it(monkeypatch):
     """Of 4.75 V, with a knee of the fourth order in power."""
-    drive_squared = Conditions.drive_squared
-
-    def otherwise(own, voltage, *others):
-        current, own.largest_current = own.largest_current, math.inf
-        if current < math.inf:
-            voltage *= (1.0 + (voltage / (current * RESISTANCE)) ** 8) ** -0.125
-        found = drive_squared(own, voltage, *others)
-        own.largest_current = current
-        return found
-    monkeypatch.setattr(Conditions, 'drive_squared', otherwise)
+    change_drive(monkeypatch, 'largest_current', math.inf, lambda voltage, current: (
+        voltage * (1.0 + (voltage / (current * RESISTANCE)) ** 8) ** -0.125))
     names = ['supply_limit', 'end_stop', 'supply_sag', 'cold_clamps', 'stress_dependence']
     found = found_in({'supply_limit': 1.0}, 5, names, protocol='arm-steps', trials=(0, 1))
     assert (found.verdict, found.missing) == ('missing', ['supply_limit'])
@@ -258,10 +257,7 @@ def test_loops_that_widen_by_another_law_are_wide_for_the_same_reason():
 
 
 def test_muscles_of_which_one_is_as_long_as_told_and_two_are_longer_are_unequal(monkeypatch):
-    def longer(conditions, size, specimen, recording):
-        conditions.wire_offsets = (0.0, 0.0013 * size, 0.0033 * size)
-    monkeypatch.setitem(hidden_physics.EFFECTS, 'unequal_muscles', dataclasses.replace(
-        hidden_physics.EFFECTS['unequal_muscles'], apply=longer))
+    change_condition(monkeypatch, 'unequal_muscles', 'wire_offsets', (0.0, 0.0013, 0.0033))
     found = found_in({'unequal_muscles': 1.0}, 5, protocol='arm-steps')
     assert (found.verdict, found.missing) == ('missing', ['unequal_muscles'])
     offsets = sorted(found.effects[0].offsets)
@@ -271,10 +267,7 @@ def test_muscles_of_which_one_is_as_long_as_told_and_two_are_longer_are_unequal(
 @LONG
 def test_an_arm_that_swings_slowly_is_heavy(monkeypatch):
     """A moment of inertia 20 times that of the payload: periods of a second."""
-    def heavy(conditions, size, specimen, recording):
-        conditions.inertia = 0.2
-    monkeypatch.setitem(hidden_physics.EFFECTS, 'inertia', dataclasses.replace(
-        hidden_physics.EFFECTS['inertia'], apply=heavy))
+    change_condition(monkeypatch, 'inertia', 'inertia', 0.2)
     names = ['inertia', 'viscous_friction', 'thermal_lag', 'latency']
     found = found_in({'inertia': 1.0}, 5, names)
     assert found.verdict == 'missing' and 'inertia' in found.missing
