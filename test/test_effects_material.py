@@ -337,7 +337,7 @@ def test_one_relaxation_follows_the_martensite(rested):
 
 
 @pytest.mark.parametrize('kept', [1.0, 2.0])
-def test_what_had_time_to_creep_on_the_bench_comes_to_it_on_the_arm(kept):
+def test_settled_creep_ends_at_the_response_of_the_bench(kept):
     """At once a step does the less, by all that its relaxations are to do."""
     time = np.array([0.1, 0.2, 1.0, 1e6, 1e6 + 0.1])
     trial = inputs(time, phase=np.array([1.0, 0.4, 0.4, 0.4, np.nan]))

@@ -112,7 +112,7 @@ def test_creep_that_outlasts_its_hold_is_creep(monkeypatch, rested):
     assert found.effects[0].t0 == pytest.approx(90.0, rel=0.2)
 
 
-def test_creep_that_the_bench_had_time_for_is_creep(monkeypatch):
+def test_creep_that_a_settled_bench_contains_is_found(monkeypatch):
     """What transforms comes in part at once, and later what is left, in 1.5 to 150 s."""
     times = 1.5 * 10.0 ** np.arange(0.0, 2.5, 0.5)
     begin_trial, crept = ParallelWires._begin, {}
@@ -188,7 +188,7 @@ def test_pulses_that_drop_out_and_pass_whole_above_are_a_dead_zone(monkeypatch):
     assert found.effects[0].Vd == pytest.approx(3.6, rel=0.1)
 
 
-def test_what_does_not_switch_at_any_duty_is_a_dead_zone(monkeypatch):
+def test_a_voltage_lost_at_any_duty_is_found_as_a_dead_zone(monkeypatch):
     """Nearly a shift of the transformation, or a sag, to a settled arm, and rarer than these."""
     change_drive(monkeypatch, 'dead_voltage', 0.0, lambda voltage, _: max(voltage - 0.3, 0.0))
     names = ['pwm_dead_zone', 'stress_dependence', 'supply_sag', 'ambient_drift']
@@ -206,7 +206,7 @@ def test_a_limited_current_is_a_limit_of_the_supply():
 
 
 @LONG
-def test_a_supply_that_gives_in_gradually_is_a_limit_of_it(monkeypatch):
+def test_a_gradual_limit_of_the_supply_is_found(monkeypatch):
     """Of 4.75 V, with a knee of the fourth order in power."""
     change_drive(monkeypatch, 'largest_current', math.inf, lambda voltage, current: (
         voltage * (1.0 + (voltage / (current * RESISTANCE)) ** 8) ** -0.125))
@@ -256,7 +256,7 @@ def test_loops_that_widen_by_another_law_are_wide_for_the_same_reason():
     assert after < 1.0 and after < 0.4 * before
 
 
-def test_muscles_of_which_one_is_as_long_as_told_and_two_are_longer_are_unequal(monkeypatch):
+def test_unequal_muscles_are_found_where_two_are_too_long(monkeypatch):
     change_condition(monkeypatch, 'unequal_muscles', 'wire_offsets', (0.0, 0.0013, 0.0033))
     found = found_in({'unequal_muscles': 1.0}, 5, protocol='arm-steps')
     assert (found.verdict, found.missing) == ('missing', ['unequal_muscles'])
@@ -265,7 +265,7 @@ def test_muscles_of_which_one_is_as_long_as_told_and_two_are_longer_are_unequal(
 
 
 @LONG
-def test_an_arm_that_swings_slowly_is_heavy(monkeypatch):
+def test_a_large_moment_of_inertia_is_found(monkeypatch):
     """A moment of inertia 20 times that of the payload: periods of a second."""
     change_condition(monkeypatch, 'inertia', 'inertia', 0.2)
     names = ['inertia', 'viscous_friction', 'thermal_lag', 'latency']

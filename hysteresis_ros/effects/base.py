@@ -269,11 +269,6 @@ class Effect(abc.ABC):
         self.parameters = self.describe(surroundings)
         self._begin({parameter.name: parameter.neutral for parameter in self.parameters}, values)
 
-    @property
-    def prior_odds(self) -> float:
-        """Odds, before any data, that it acts in the form that it has, over those of any effect."""
-        return 1.0
-
     def _begin(self, known: Mapping[str, float], values: Mapping[str, float]) -> None:
         """Take over known values and new ones, with no intervals and no past."""
         self.values = {name: float(value) for name, value in known.items()}
@@ -323,6 +318,11 @@ class Effect(abc.ABC):
         """
         for name in self.memory:
             setattr(self, name, state[name])
+
+    @property
+    def prior_odds(self) -> float:
+        """Return the odds, before any data, that it acts in this form over those of any effect."""
+        return 1.0
 
     @property
     def size_parameter(self) -> Parameter:

@@ -85,11 +85,7 @@ class Creep(MaterialEffect):
         self._target = 0.0
 
     def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
-        """
-        Begin also with a relaxation that outlasts holds of half a minute, and with a rest.
-
-        And with a muscle whose bench had time to creep.
-        """
+        """Begin also with slow relaxations, new or settled on the bench, and from a cold muscle."""
         slow = {'c': 0.15, 't0': self.SLOW, 'kept': SINGLE}
         return [{**slow, 'rested': 0.0}, {**slow, 'rested': 1.0},
                 {'c': 0.15, 'kept': 1.0, 'rested': 1.0}, {'c': 0.15, 'kept': 1.0, 'settled': 1.0}]

@@ -54,7 +54,7 @@ class SupplySag(ElectricalEffect):
 
 
 # Values of `whole` for pulses that pass whole, and for those that lose what does not switch.
-WHOLE, REST = 1.0, 2.0
+WHOLE, REDUCED = 1.0, 2.0
 
 
 class PwmDeadZone(ElectricalEffect):
@@ -81,7 +81,7 @@ class PwmDeadZone(ElectricalEffect):
         Parameter('Vd', 'V', 'largest voltage that has no effect', 0.05, 1.5, 0.0, (0.3, 1.0),
                   log=True, scale='drive'),
         Parameter('whole', '1', 'what arrives above it, 0: the rest, stretched to the full range, '
-                  '1: all, 2: the rest as it is', 0.0, 2.0, 0.0, (0.0,), choices=(0.0, 1.0, 2.0),
+                  '1: all, 2: less by Vd', 0.0, 2.0, 0.0, (0.0,), choices=(0.0, 1.0, 2.0),
                   kinds=('arm',), form=True))
 
     # Largest duty of pulses that drop out, as the voltage over that of a zone that is stretched.
@@ -99,12 +99,12 @@ class PwmDeadZone(ElectricalEffect):
     def guesses(self, measured: np.ndarray) -> list[dict[str, float]]:
         """Begin also with losses, and with pulses that drop out: no slope says where they do."""
         return [{'Vd': part * self.parameters[0].high, 'whole': whole}
-                for parts, whole in ((self.CUTS, WHOLE), (self.LOSSES, REST)) for part in parts]
+                for parts, whole in ((self.CUTS, WHOLE), (self.LOSSES, REDUCED)) for part in parts]
 
     @property
     def prior_odds(self) -> float:
-        """Return less where something is lost at any duty."""
-        return self.RARE if self.whole == REST else 1.0
+        """Return lower odds for a loss at any duty."""
+        return self.RARE if self.whole == REDUCED else 1.0
 
     def implausible(self, slack: float = 0.0, duration: float = 0.0) -> list[str]:
         """Name a zone that is too wide; see `Effect.implausible`."""
@@ -132,7 +132,7 @@ class PwmDeadZone(ElectricalEffect):
         return signal / self._stretch(surroundings) + self.Vd
 
     def _stretch(self, surroundings: Surroundings) -> float:
-        if self.whole == REST:
+        if self.whole == REDUCED:
             return 1.0
         full = math.sqrt(surroundings.full_drive_squared)
         return full / max(full - self.Vd, 1e-3 * full)
@@ -161,7 +161,7 @@ class SupplyLimit(ElectricalEffect):
         Parameter('soft', '1', 'how gradually it is reached, 0: at once', 0.0, 0.2, 0.0,
                   (0.0, 0.08), limits=(0.0, 0.3), kinds=('arm',), form=True))
 
-    # A knee of a higher order than the inverse of this is none.
+    # With less than this the knee is so narrow that it is none.
     SHARP = 0.01
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
