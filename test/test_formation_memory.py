@@ -12,7 +12,7 @@ from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.identification.bench import identify
-from hysteresis_ros.kernels.formation import elongations, FORMED, OUTPUT, SCALE
+from hysteresis_ros.kernels.formation import elongations, FORMED, OUTPUT, SCALE, SIZE
 from hysteresis_ros.laboratory.bench import Bench
 from hysteresis_ros.laboratory.conditions import Air, Conditions
 from hysteresis_ros.laboratory.experiments import experiment_tables
@@ -236,12 +236,12 @@ def test_what_is_kept_is_saved_and_restored(names):
     voltage = controller.setpoint(*reference).voltage
     assert other.setpoint(*reference).voltage == pytest.approx(voltage, abs=1e-8)
     # Without what is kept, the same place asks for another voltage.
-    forgotten = {**saved, 'second': [{**entry, 'formation': [0.0] * 4}
+    forgotten = {**saved, 'second': [{**entry, 'formation': [0.0] * SIZE}
                                      for entry in saved['second']]}
     other.restore(forgotten)
     other.reference(1.62)
     assert abs(other.setpoint(*reference).voltage - voltage) > 1e-3
-    for damaged in ([0.0], [np.nan] * 4, 'much'):
+    for damaged in ([0.0], [np.nan] * SIZE, 'much'):
         wrong = [{**entry, 'formation': damaged} for entry in saved['second']]
         with pytest.raises(ParameterError, match='does not fit'):
             controller.restore({**saved, 'second': wrong})

@@ -23,11 +23,18 @@ def excited():
     return inputs, np.array([20, len(inputs)]), np.arange(len(inputs)) % 3 != 0
 
 
+@pytest.fixture(params=[(1.0, 1.0), (0.6, 0.8)], ids=['all is oriented', 'a share'])
+def oriented(excited, request):
+    """Return the share of what forms that the load of each trial orients."""
+    _, ends, _ = excited
+    return np.repeat(request.param, np.diff(ends, prepend=0))
+
+
 @pytest.fixture
-def kinetic(excited):
+def kinetic(excited, oriented):
     """Return what kinetics add there."""
     inputs, ends, wanted = excited
-    return KineticWeights(NODES, inputs, ends, wanted, plain_shares(excited), TOP)
+    return KineticWeights(NODES, inputs, ends, wanted, plain_shares(excited), TOP, oriented)
 
 
 def plain_shares(excited):
@@ -45,14 +52,14 @@ def some_weights(seed, zeros=0.6):
 
 
 @pytest.mark.parametrize('zeros', [0.0, 0.6, 0.95])
-def test_response_is_that_of_the_operator(excited, kinetic, zeros):
+def test_response_is_that_of_the_operator(excited, oriented, kinetic, zeros):
     inputs, ends, wanted = excited
     z = some_weights(1, zeros)
     whole = Kinetic(operator_with(NODES, z[:-1] / weight_sizes(NODES), z[-1]), 1.0, TOP)
     expected = []
-    for trial in np.split(inputs, ends[:-1]):
+    for trial, share in zip(np.split(inputs, ends[:-1]), np.split(oriented, ends[:-1])):
         whole.reset()
-        expected.append(whole.simulate(trial))
+        expected.append(whole.simulate_under(trial, share))
     found = plain_shares(excited) @ z + kinetic.added(z)
     # The operator has its branches in a table.
     assert found == pytest.approx(np.concatenate(expected)[wanted], abs=2e-3 * np.ptp(found))
@@ -124,6 +131,6 @@ def test_a_step_that_makes_it_worse_is_cut_short_or_left_out(kinetic, fitting):
     assert kinetic.fitted(start, residual, wrong, np.inf) == pytest.approx(start)
 
     def dear(tangent):
-        return true, -heavy
+        return true, -10.0 * heavy
     # What the penalty takes away may count more than what the rows gain.
     assert kinetic.fitted(start, residual, dear, np.inf) == pytest.approx(start)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 GRID = math.radians(0.2)
 # Loads of the muscle's table, up to this many times the largest at rest.
 LOADS, LARGEST = 400, 4.0
-_NO_MUSCLE = np.zeros((0, 4)), 0.0
+_NO_MUSCLE = np.zeros((0, SIZE)), 0.0
 # Where a trial without rows ends.
 ONE_EMPTY_TRIAL = np.zeros(1, dtype=np.int64)
 # Load [N] over which the slope of what the transformation feels is taken.

@@ -32,7 +32,7 @@ class Bundle:
 
     Attributes
     ----------
-    muscles : ndarray, shape (muscles, 4)
+    muscles : ndarray, shape (muscles, 5)
         What is remembered of each in addition to its operator's memory; see `kernels.formation`.
     """
 

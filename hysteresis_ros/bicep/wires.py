@@ -52,9 +52,9 @@ def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
     table: Any = operator.table if isinstance(operator, CompiledOperator) else None
     offsets = np.array(chain.offsets, dtype=float)
     operators, memories = with_own_memories([operator] * len(offsets))
-    scales, widths, lightest, spacing = np.ones(1), np.zeros(1), 0.0, 1.0
-    plays, kept = chain.plays and loaded, chain.keeps_strain
-    if plays or kept or len(offsets) > 1:
+    scales, widths, oriented, lightest, spacing = np.ones(1), np.zeros(1), np.ones(1), 0.0, 1.0
+    plays, kept, orients = chain.plays and loaded, chain.keeps_strain, chain.orients
+    if plays or kept or orients or len(offsets) > 1:
         loads = np.linspace(0.0, LARGEST * (chain.surroundings.load or 1.0), LOADS)
         inside = chain.load_inside(loads) + 0.0 * loads
         lightest, spacing = float(inside[0]), float(np.ptp(inside)) / (LOADS - 1)
@@ -62,11 +62,13 @@ def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
         scales = np.interp(even, inside, chain.scale(loads) + 0.0 * loads)
         if plays:
             widths = np.interp(even, inside, chain.loop_width(loads))
+        if orients:
+            oriented = np.interp(even, inside, chain.oriented(loads))
     own = chain.compliance()
     typical = COMPLIANCE * chain.surroundings.over_paper('compliance')
     return (Wires(table, operator.output_range[0], offsets, own or typical,
-                  1e-10 * (operator.upper - operator.lower), scales, widths, lightest, spacing,
-                  own > 0.0, kept), operators, memories)
+                  1e-10 * (operator.upper - operator.lower), scales, widths, oriented, lightest,
+                  spacing, orients, own > 0.0, kept), operators, memories)
 
 
 def with_own_memories(operators: Sequence[HysteresisOperator]

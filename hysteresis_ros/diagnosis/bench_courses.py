@@ -14,6 +14,7 @@ from hysteresis_ros.diagnosis.bench_design import Course, Excitation, Feedback
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.kernels.load_play import follow
 from hysteresis_ros.model.chain import Chain
+from hysteresis_ros.model.kinetic_stage import output_along
 
 if TYPE_CHECKING:
     from hysteresis_ros.model import MuscleModel
@@ -96,12 +97,9 @@ class BenchCourses:
 
     def outputs(self, course: Course, stage: HysteresisOperator) -> list[np.ndarray]:
         """Return what an H2 gives in every row of each trial."""
-        found = []
-        for part in np.split(course.excitation.inputs, self._ends[:-1]):
-            stage.reset()
-            stage.step(part[0])
-            found.append(stage.simulate(part[1:]))
-        return found
+        return [output_along(stage, part, oriented)[1:] for part, oriented in zip(
+            *(np.split(column, self._ends[:-1]) for column in (
+                course.excitation.inputs, course.oriented)))]
 
     def judged(self, course: Course) -> tuple[np.ndarray, np.ndarray]:
         """Return the factor on the output of H2 and what is added in judged rows, each (n,)."""
@@ -122,7 +120,7 @@ class BenchCourses:
         offset, factor = np.concatenate(drifts, axis=1) if drifts else (0.0, 1.0)
         scales, known = chain.scale(load) * factor + 0.0 * load, chain.stretch(load) + offset
         return Course(self._excitation(chain, np.concatenate(driven)), scales, known,
-                      chain.kinetics)
+                      chain.kinetics, chain.oriented(load)[self._felt])
 
     def _excitation(self, chain: Chain, squared: np.ndarray) -> Excitation:
         """Return what H2 is given for the drive squared of all trials, shape (rows + trials,)."""

@@ -96,11 +96,20 @@ class Excitation:
         found[:, -1] = 1.0
         return found
 
-    def kinetic(self, levels: int, top: float) -> KineticWeights:
-        """Return what kinetics add to the response where all has transformed at an input."""
+    def kinetic(self, levels: int, top: float, oriented: np.ndarray) -> KineticWeights:
+        """
+        Return what kinetics add to the response where all has transformed at an input.
+
+        Parameters
+        ----------
+        levels : int
+        top : float
+        oriented : ndarray, shape (rows + trials,)
+            Share of what forms that each input's load orients.
+        """
         plain = self.shares(levels, np.ones(len(self._response)))
         return KineticWeights(
-            self.nodes(levels), self.inputs, self._ends, self.wanted, plain, top)
+            self.nodes(levels), self.inputs, self._ends, self.wanted, plain, top, oriented)
 
 
 @dataclasses.dataclass
@@ -127,13 +136,15 @@ class Course:
     What H2 is given, trial after trial, and what is done to its output.
 
     `scales` and `known` (rows,) multiply the output above its least and are added to it; a share
-    `kinetics` of it follows those of `Kinetics`.
+    `kinetics` of it follows those of `Kinetics`, with the share `oriented` (rows + trials,) of what
+    forms.
     """
 
     excitation: Excitation
     scales: np.ndarray
     known: np.ndarray
     kinetics: float
+    oriented: np.ndarray
 
 
 @dataclasses.dataclass

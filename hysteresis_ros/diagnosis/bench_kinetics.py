@@ -22,11 +22,14 @@ from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.forms import other_forms, simplest_forms
+from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.significance import (
     independent_rows, schwarz_log_odds, SIGNIFICANCE)
-from hysteresis_ros.effects import Effect
+from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.measurements.turns import turns
+from hysteresis_ros.model.chain import Chain
 
 # Shares that are tried first, and those that are tried too where one of them is better than none.
 COARSE, FINE = (0.25, 0.5, 0.75, 1.0), (0.125, 0.375, 0.625, 0.875)
@@ -83,26 +86,121 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetic
 
 def _shown(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetics | None:
     """Return what `shown_kinetics` does, with the weights of one problem."""
-    problem = fitter.problem
     with np.errstate(all='ignore'):
         profile = _Profile(fitter, found)
-        profile.evaluate(COARSE[:1])
+        profile.search()
+        surroundings = fitter.problem.model.surroundings
+        if Chain([*fitter.fixed, *found, Kinetics(surroundings, share=1.0, orients=1.0)],
+                 surroundings).orients:
+            profile = _orienting(fitter, found, profile)
+        if profile.best == 0.0 or not profile.proves():
+            return None
+        return profile.shown()
+
+
+def _orienting(fitter: BenchFitter, found: Sequence[Effect], plain: _Profile) -> _Profile:
+    """
+    Return the profile of branches that orient anew what a low load has left twinned, if it shows.
+
+    Under constant loads a softer martensite lengthens the stroke as orientation does. Where minor
+    loops tell how much of it a load orients, what every loaded muscle has, and the form of the
+    growth with the load, are sought again.
+    """
+    as_found = _Profile(fitter, found, orients=1.0, plain=plain)
+    as_found.search()
+    if as_found.best == 0.0 or not as_found.proves(plain):
+        return plain
+    others = [_Profile(fitter, found, start, orients=1.0, plain=plain)
+              for start in _variations(fitter, as_found.fits[as_found.best].effects)]
+    for other in others:
+        other.evaluate([as_found.best])
+    for other in sorted(others, key=lambda one: one.errors[as_found.best]):
+        if other.proves(as_found):
+            other.search()
+            if other.shown() is not None:
+                return other
+    return as_found if as_found.shown() is not None else plain
+
+
+def _variations(fitter: BenchFitter, effects: Sequence[Effect]) -> list[list[Effect]]:
+    """Return effects in other forms, and each with one more that every loaded muscle has."""
+    surroundings = fitter.problem.model.surroundings
+    known = {effect.id for effect in (*fitter.fixed, *effects)}
+    universal = usual([kind(surroundings) for name, kind in catalogue().items()
+                       if kind.universal and name not in known and kind.available(surroundings)],
+                      'bench')
+    found = []
+    for forms in ({}, *other_forms(effects), *filter(None, [simplest_forms(effects)])):
+        formed = [effect.with_values(**forms.get(effect.id, {})) for effect in effects]
+        found += [formed, *([*formed, one] for one in universal)]
+    return found[1:]
+
+
+class _Profile:
+    """
+    RMSE of a row left out by the share that follows the kinetics, all else fitted to each.
+
+    Parameters
+    ----------
+    fitter : BenchFitter
+        Rows, and a model without the effects.
+    found : sequence of Effect
+        Effects with values.
+    start : sequence of Effect, optional
+        Where fits of these, and perhaps of others, begin.
+    orients : float
+        Form of the kinetics.
+    plain : _Profile, optional
+        Profile with the fit without kinetics; by default it is fitted.
+
+    Attributes
+    ----------
+    errors : dict of float to float
+    fits : dict of float to Fit
+    """
+
+    def __init__(self, fitter: BenchFitter, found: Sequence[Effect],
+                 start: Sequence[Effect] | None = None, orients: float = 0.0,
+                 plain: _Profile | None = None) -> None:
+        self._fitter, self._found, self._orients = fitter, found, orients
+        self._start = found if start is None else start
+        self.errors: dict[float, float] = {}
+        self.fits: dict[float, Fit] = {}
+        if plain is None:
+            self.evaluate((0.0,))
+        else:
+            self.errors[0.0], self.fits[0.0] = plain.errors[0.0], plain.fits[0.0]
+        problem = fitter.problem
+        self._rows = independent_rows(
+            problem.measured - self.fits[0.0].predicted, problem.trial,
+            len(np.unique(problem.block)))
+
+    def search(self) -> None:
+        """Fit the effects with the shares among which the best is."""
+        self.evaluate(COARSE[:1])
         # The error bends but once.
-        if profile.unlikely(COARSE[0]):
-            return None
-        profile.evaluate(COARSE[1:])
-        if profile.best == 0.0:
-            return None
-        profile.evaluate(FINE)
-        if not profile.proves():
-            return None
-        kinetics = Kinetics(problem.model.surroundings, share=profile.best)
-        kinetics.intervals['share'] = profile.interval()
-        own = profile.fitter_with(profile.best)
-        fit = profile.fits[profile.best]
+        if self.best == 0.0 and self.unlikely(COARSE[0]):
+            return
+        self.evaluate(COARSE[1:])
+        if self.best != 0.0:
+            self.evaluate(FINE)
+
+    def kinetics_of(self, share: float) -> Kinetics:
+        """Return the kinetics of a share."""
+        return Kinetics(self._fitter.problem.model.surroundings, share=share,
+                        orients=self._orients)
+
+    def shown(self) -> BenchKinetics | None:
+        """Return the effects with the best share; None where rows do not determine them."""
+        problem = self._fitter.problem
+        kinetics = self.kinetics_of(self.best)
+        kinetics.intervals['share'] = self.interval()
+        own = self.fitter_with(self.best)
+        fit = self.fits[self.best]
         effects = own.with_intervals(fit)
         # What loads held out have determined is not refitted to rows that do not determine it.
-        vague = [one for one, fitted in zip(found, effects) if not_determined(fitted, problem.kind)]
+        vague = [one for one in self._found if any(
+            fitted.id == one.id and not_determined(fitted, problem.kind) for fitted in effects)]
         if vague:
             own.fixed = [*own.fixed, *vague]
             fit = own.fit([one for one in fit.effects
@@ -111,29 +209,8 @@ def _shown(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetics | None
         if fit.implausible() or any(not_determined(effect, problem.kind)
                                     for effect in (*effects, kinetics)):
             return None
-    return BenchKinetics([*vague, *effects, kinetics], profile.errors[0.0],
-                         profile.errors[profile.best])
-
-
-class _Profile:
-    """
-    RMSE of a row left out by the share that follows the kinetics, all else fitted to each.
-
-    Attributes
-    ----------
-    errors : dict of float to float
-    fits : dict of float to Fit
-    """
-
-    def __init__(self, fitter: BenchFitter, found: Sequence[Effect]) -> None:
-        self._fitter, self._found = fitter, found
-        self.errors: dict[float, float] = {}
-        self.fits: dict[float, Fit] = {}
-        self.evaluate((0.0,))
-        problem = fitter.problem
-        self._rows = independent_rows(
-            problem.measured - self.fits[0.0].predicted, problem.trial,
-            len(np.unique(problem.block)))
+        return BenchKinetics([*vague, *effects, kinetics], self.errors[0.0],
+                             self.errors[self.best])
 
     @property
     def best(self) -> float:
@@ -144,15 +221,15 @@ class _Profile:
         """Return the fitter with kinetics of a share."""
         own = self._fitter.apart()
         if share:
-            own.fixed = [*own.fixed, Kinetics(own.problem.model.surroundings, share=share)]
+            own.fixed = [*own.fixed, self.kinetics_of(share)]
         return own
 
     def evaluate(self, shares: Sequence[float]) -> None:
         """Fit the effects with some shares."""
         for share in shares:
             near = min(self.fits, key=lambda one: abs(one - share), default=None)
-            starts = [self._found]
-            if near is not None:
+            starts = [self._start]
+            if near is not None and len(self.fits[near].effects) == len(self._start):
                 starts.append(self.fits[near].effects)
             for start in starts:
                 own = self.fitter_with(share)
@@ -163,10 +240,10 @@ class _Profile:
                 if share not in self.fits or error < self.errors[share]:
                     self.errors[share], self.fits[share] = error, fit
 
-    def proves(self) -> bool:
-        """Whether the best share is better than none by more than one parameter makes it."""
-        return schwarz_log_odds(
-            self.errors[0.0], self.errors[self.best], self._rows, 1) > 0.0
+    def proves(self, other: _Profile | None = None) -> bool:
+        """Whether the best share is better than none, or another profile's, by a parameter more."""
+        error = self.errors[0.0] if other is None else other.errors[other.best]
+        return schwarz_log_odds(error, self.errors[self.best], self._rows, 1) > 0.0
 
     def unlikely(self, share: float) -> bool:
         """Whether a share is surely less likely than the best (95 %)."""

@@ -90,7 +90,7 @@ def _kinetics(selection: BenchSelection) -> dict[str, Any] | None:
     shown = shown_kinetics(selection.fitter, selection.found.effects)
     if shown is None:
         return None
-    size, = Kinetics.parameters
+    size = Kinetics.parameters[0]
     return {'effect': Kinetics.id, size.name: shown.effects[-1].values[size.name],
             'rmse_before': shown.before, 'rmse_after': shown.after}
 

@@ -289,7 +289,7 @@ class BenchWeights:
         """Return what kinetics of all of the wire add to H2 on a grid."""
         top = cold_input(self._model, Chain(effects, self._surroundings), float(nodes[0]),
                          float(nodes[-1]))
-        return course.excitation.kinetic(len(nodes) - 1, top)
+        return course.excitation.kinetic(len(nodes) - 1, top, course.oriented)
 
     def _phases(self, effects: Sequence[Effect], train: np.ndarray | None) -> list[np.ndarray]:
         """

@@ -369,7 +369,7 @@ def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect]
     -------
     ndarray, shape (n,)
     """
-    size, = kind.parameters
+    size = kind.parameters[0]
     return _change_by(kind(problem.model.surroundings, **{size.name: 1.0}), problem, effects)
 
 

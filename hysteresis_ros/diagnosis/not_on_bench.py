@@ -47,7 +47,7 @@ def not_on_bench(selection: Selection, fit: Fit) -> dict[str, dict[str, Any]]:
     effects = [*unaffected(selection.fixed, fit.effects), *fit.effects]
     found: dict[str, dict[str, Any]] = {}
     for kind, share in zip(COURSES, discrepancy.shares(before).tolist()):
-        size, = kind.parameters
+        size = kind.parameters[0]
         if share < size.low:
             continue
         response, = problem.simulate_many([[*effects, kind(surroundings, **{size.name: share})]])

@@ -29,21 +29,30 @@ class Kinetics(MaterialEffect):
                 'loops do not close.')
     equation = ('y = (1 - share) H2[u] + share Y, dY = (Y1 - Y) dR / (Y1 - R) while u rises and '
                 'dY = Y dD / D while it falls, with the branches R(u) and D(u) of the major loop '
-                'of H2 and its upper end Y1')
+                'of H2 and its upper end Y1; with orients g Y in the place of Y and g R in that of '
+                'R while u rises, g = 1 - r s(F) of stress_dependent_strain')
     source = ('Tanaka, Res Mechanica 18 (1986) 251; Liang and Rogers, J. Intell. Mater. Syst. '
-              'Struct. 1 (1990) 207')
+              'Struct. 1 (1990) 207; orients: Brinson, J. Intell. Mater. Syst. Struct. 4 (1993) '
+              '229')
     shows_in = 'small loops in the middle of the way, which shift from one to the next'
     experiment = ('go to and fro between two drives in the middle of the loop five times: each '
                   'loop begins a little further on')
     confused_with = ('fatigue', 'creep')
     parameters = (
         Parameter('share', '1', 'share of the transformation that follows the kinetics', 0.1, 1.0,
-                  0.0, (0.4, 0.9), limits=(0.0, 1.0)),)
+                  0.0, (0.4, 0.9), limits=(0.0, 1.0)),
+        Parameter('orients', '1', 'whether each branch orients what a low load has left twinned',
+                  0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0), kinds=('bench',), form=True))
 
     @property
     def kinetics(self) -> float:    # type: ignore[override]
         """Return the share."""
         return self.share
+
+    @property
+    def orients_anew(self) -> float:    # type: ignore[override]
+        """Return whether branches do."""
+        return self.orients
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:

@@ -135,6 +135,11 @@ class StressDependentStrain(MaterialEffect):
         """Return the strain under a load over that under the bench's mean load."""
         return (1.0 - self.r * self._missing(load, surroundings)) / self._at_mean()
 
+    def oriented(self, load: Values, surroundings: Surroundings) -> Values:
+        """Return the strain under a load over that under an infinite one."""
+        # What is never oriented could not be divided by.
+        return np.maximum(1.0 - self.r * self._missing(load, surroundings), 0.02)
+
     def stretch(self, load: Values, surroundings: Surroundings) -> Values:
         """Return what keeps the cold muscle's resting length, whatever the growth, if anything."""
         if self.hot:

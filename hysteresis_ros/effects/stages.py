@@ -84,6 +84,8 @@ class MaterialEffect(Effect):
     keeps_strain: float = 0.0
     # Share, 0 to 1, of the transformation whose minor loops are scaled from the major one.
     kinetics: float = 0.0
+    # Share, 0 to 1, of what a load has left twinned that each branch of these orients anew.
+    orients_anew: float = 0.0
     # Excess length [m] of each parallel muscle.
     offsets: tuple[float, ...] = (0.0,)
     # Parts of the wire that are not equally warm, and the excess of each over that of the wire on
@@ -116,6 +118,10 @@ class MaterialEffect(Effect):
 
     def strain_of_bench(self, load: Values, surroundings: Surroundings) -> Values:
         """Return the bench's transformation strain under a load over that under the mean load."""
+        return 1.0 + 0.0 * load
+
+    def oriented(self, load: Values, surroundings: Surroundings) -> Values:
+        """Return the share of what forms that a load orients, the rest of which is twinned."""
         return 1.0 + 0.0 * load
 
     def stretch(self, load: Values, surroundings: Surroundings) -> Values:

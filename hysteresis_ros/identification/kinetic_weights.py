@@ -56,10 +56,13 @@ class KineticWeights:
         What the weights and, last, the bias contribute without kinetics.
     top : float
         Input at which all has transformed.
+    oriented : ndarray, shape (M,)
+        Share of what forms that each input's load orients.
     """
 
     def __init__(self, nodes: np.ndarray, inputs: np.ndarray, ends: np.ndarray,
-                 wanted: np.ndarray, plain: np.ndarray, top: float) -> None:
+                 wanted: np.ndarray, plain: np.ndarray, top: float, oriented: np.ndarray) -> None:
+        self._oriented = oriented
         self._inputs, self._ends, self._wanted = np.minimum(inputs, top), ends, wanted
         self._plain = plain[:, :-1]
         count = len(inputs)
@@ -77,13 +80,14 @@ class KineticWeights:
         """Return what kinetics add to the response of weights and bias (K + 1,), shape (n,)."""
         weights = z[:-1]
         found = transformed(self._rising @ weights, self._falling @ weights,
-                            float(self._whole @ weights), self._inputs, self._ends)
+                            float(self._whole @ weights), self._inputs, self._oriented,
+                            self._ends)
         return found[self._wanted] - self._plain @ weights
 
     def tangent(self, z: np.ndarray) -> Tangent:
         """Return what kinetics add for weights and bias near some, shape (K + 1,)."""
         found = derivative(self._rising, self._falling, self._whole, z[:-1], self._inputs,
-                           self._ends)[self._wanted] - self._plain
+                           self._oriented, self._ends)[self._wanted] - self._plain
         rows = np.column_stack((found, np.zeros(len(found))))
         return Tangent(rows, self.added(z) - rows @ z)
 

@@ -19,11 +19,11 @@ import numpy as np
 
 from . import root
 from .clip import clip
-from .formation import keep, LOAD, parts, SIZE
+from .formation import keep, LOAD, ORIENTED, parts, SIZE
 from .jit import remember_types
 from .lean import inlined, lean
 from .load_play import held
-from .operator import last_input, last_output, peek, step
+from .operator import last_input, last_output, orient, peek, step
 
 # About how far muscles go for a load that is missing [m/N], to begin a search with.
 TYPICAL_COMPLIANCE = 1e-3
@@ -43,8 +43,9 @@ class Wires(NamedTuple):
     lengths, `compliance` [m/N] that of a wire, and `tolerance` [N] the load that may be missing.
     `scales` (m,) is the factor on the strain, and `widths` (m,) by how much the loop is wider than
     that of H2, at loads `spacing` [N] apart from `lightest` on, as the transformation feels them.
-    `elastic` says whether the compliance is the wires' own, not a typical one, and `kept` is the
-    share of the strain that martensite keeps (see `formation`).
+    `oriented` (m,) is the share of what forms that these loads orient, where `orients` says that it
+    counts (see `kinetics`). `elastic` says whether the compliance is the wires' own, not a typical
+    one, and `kept` is the share of the strain that martensite keeps (see `formation`).
     """
 
     table: np.ndarray
@@ -54,8 +55,10 @@ class Wires(NamedTuple):
     tolerance: float
     scales: np.ndarray
     widths: np.ndarray
+    oriented: np.ndarray
     lightest: float
     spacing: float
+    orients: bool
     elastic: bool
     kept: float
 
@@ -64,6 +67,21 @@ class Wires(NamedTuple):
 def scale_at(wires: Wires, load: float) -> float:
     """Return the factor on the strain under a load, as the transformation feels it."""
     return _looked_up(wires, wires.scales, load)
+
+
+@inlined
+def width_at(wires: Wires, load: float) -> float:
+    """Return by how much the loop is wider than that of H2, under a load as it feels it."""
+    return _looked_up(wires, wires.widths, load)
+
+
+@inlined
+def orient_under(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, load: float
+                 ) -> None:
+    """Let a load, as the transformation feels it, orient its share of what forms in a muscle."""
+    if wires.orients:
+        muscles[i, ORIENTED] = _looked_up(wires, wires.oriented, load)
+        orient(wires.table, memory, muscles[i, ORIENTED])
 
 
 @inlined
@@ -80,7 +98,7 @@ def _looked_up(wires: Wires, values: np.ndarray, load: float) -> float:
 @inlined
 def input_for(wires: Wires, memory: np.ndarray, v: float, x: float) -> float:
     """Return the input of H2 of a muscle with ``v = F - x``."""
-    return held(last_input(wires.table, memory), v, _looked_up(wires, wires.widths, v + x))
+    return held(last_input(wires.table, memory), v, width_at(wires, v + x))
 
 
 @inlined
@@ -133,6 +151,7 @@ def _load_for(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, out
 def _excess(wires: Wires, memory: np.ndarray, muscles: np.ndarray, i: int, v: float,
             output: float, load: float, unstretched: float, x: float) -> float:
     """Return how much longer a muscle with a load v + x is than the others let it be [m]."""
+    orient_under(wires, memory, muscles, i, v + x)
     mean, given = scale_at(wires, load), peek(wires.table, memory, input_for(wires, memory, v, x))
     strained, held = parts(wires.kept, muscles, i, given - wires.base)
     return (scale_at(wires, v + x) * strained + held + wires.compliance * (v + x - unstretched)
@@ -171,6 +190,7 @@ def commit(wires: Wires, memories: np.ndarray, muscles: np.ndarray, x: float) ->
     """Commit each muscle's v."""
     for i in range(len(wires.offsets)):
         v = muscles[i, LOAD]
+        orient_under(wires, memories[i], muscles, i, v + x)
         step(wires.table, memories[i], input_for(wires, memories[i], v, x))
         if wires.kept != 0.0:
             keep(muscles, i, last_output(wires.table, memories[i]) - wires.base,
@@ -208,7 +228,7 @@ def respond(wires: Wires, memories: np.ndarray, search: np.ndarray, x: float, lo
     Return the output [m] that the muscles give under x and a load.
 
     Commits nothing; the output is looked for between `low` and `high`, first at `near`. The input
-    of each muscle and what its martensite keeps then go to `following`, shape (muscles, 4).
+    of each muscle and what its martensite keeps then go to `following`, shape (muscles, 5).
     """
     output = near = min(max(near, low), high)
     loads_for(wires, memories, near, load, load, x, muscles)
@@ -224,6 +244,7 @@ def respond(wires: Wires, memories: np.ndarray, search: np.ndarray, x: float, lo
     for i in range(len(muscles)):
         v = muscles[i, LOAD]
         u = input_for(wires, memories[i], v, x)
+        orient_under(wires, memories[i], muscles, i, v + x)
         for k in range(SIZE):
             following[i, k] = muscles[i, k]
         following[i, LOAD] = u

@@ -19,9 +19,10 @@ from .jit import jit
 from .lean import lean
 
 # What is remembered of each muscle: its load beyond x (see `bundle`); P [m]; S(F) at the last
-# sample, 0 before the first, whose martensite formed under its own load; and y [m].
-LOAD, FORMED, SCALE, OUTPUT = range(4)
-SIZE = 4
+# sample, 0 before the first, whose martensite formed under its own load; y [m]; and where kinetics
+# depend on it, g of the load (see `kinetics`).
+LOAD, FORMED, SCALE, OUTPUT, ORIENTED = range(5)
+SIZE = 5
 
 
 @lean
@@ -35,7 +36,7 @@ def parts(kept: float, muscles: np.ndarray, i: int, output: float) -> tuple[floa
     ----------
     kept : float
         Share of the strain that is kept, 0 to 1; the rest is that of the present load.
-    muscles : ndarray, shape (muscles, 4)
+    muscles : ndarray, shape (muscles, 5)
         What is remembered.
     i : int
         Which of them.

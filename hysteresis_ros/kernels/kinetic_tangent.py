@@ -10,9 +10,9 @@ from .kinetics import LEAST
 
 @jit
 def transformed(rising: np.ndarray, falling: np.ndarray, whole: float, inputs: np.ndarray,
-                ends: np.ndarray) -> np.ndarray:
+                oriented: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """
-    Return what has transformed in each row, in the unit of the branches; see `kernels.kinetics`.
+    Return P / g of each row, in the unit of the branches; see `kernels.kinetics`.
 
     Parameters
     ----------
@@ -22,6 +22,8 @@ def transformed(rising: np.ndarray, falling: np.ndarray, whole: float, inputs: n
         What the loop gives from end to end.
     inputs : ndarray, shape (M,)
         Inputs, trial after trial; each trial starts from the lower end.
+    oriented : ndarray, shape (M,)
+        g, the share of what forms that is oriented.
     ends : ndarray of int, shape (trials,)
         Where in `inputs` each trial ends.
 
@@ -34,26 +36,27 @@ def transformed(rising: np.ndarray, falling: np.ndarray, whole: float, inputs: n
     for end in ends:
         x = 0.0
         for n in range(begin, end):
-            before = n - 1
+            before, most = n - 1, oriented[n] * whole
+            here = min(rising[n], most)
             if n == begin:
-                x = rising[n]
+                x = here
             elif inputs[n] > inputs[before]:
-                left = whole - rising[before]
+                left = whole - min(rising[before], most)
                 if left > LEAST * whole:
-                    x = whole - (whole - x) * (whole - rising[n]) / left
+                    x = whole - (whole - x) * (whole - here) / left
             elif inputs[n] < inputs[before]:
                 there = falling[before]
                 if there > LEAST * whole:
                     x *= falling[n] / there
-            x = min(max(x, rising[n]), falling[n])
-            found[n] = x
+            x = min(max(x, here), falling[n])
+            found[n] = x / oriented[n]
         begin = end
     return found
 
 
 @jit
 def derivative(rising: np.ndarray, falling: np.ndarray, whole: np.ndarray, z: np.ndarray,
-               inputs: np.ndarray, ends: np.ndarray) -> np.ndarray:
+               inputs: np.ndarray, oriented: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """
     Return the derivative of `transformed` with respect to each of the weights.
 
@@ -67,6 +70,8 @@ def derivative(rising: np.ndarray, falling: np.ndarray, whole: np.ndarray, z: np
         The weights.
     inputs : ndarray, shape (M,)
         Inputs, trial after trial; each trial starts from the lower end.
+    oriented : ndarray, shape (M,)
+        g, the share of what forms that is oriented.
     ends : ndarray of int, shape (trials,)
         Where in `inputs` each trial ends.
 
@@ -80,15 +85,18 @@ def derivative(rising: np.ndarray, falling: np.ndarray, whole: np.ndarray, z: np
     for end in ends:
         x, by = 0.0, np.zeros(len(z))
         for n in range(begin, end):
-            before = n - 1
+            before, most = n - 1, oriented[n] * top
+            here, move = (up[n], rising[n]) if up[n] < most else (most, oriented[n] * whole)
             if n == begin:
-                x, by = up[n], rising[n].copy()
+                x, by = here, move.copy()
             elif inputs[n] > inputs[before]:
-                left = top - up[before]
+                past, moved = (up[before], rising[before]) if up[before] < most else (
+                    most, oriented[n] * whole)
+                left = top - past
                 if left > LEAST * top:
-                    share, remaining = (top - up[n]) / left, top - x
+                    share, remaining = (top - here) / left, top - x
                     by = whole - share * (whole - by) - remaining / left * (
-                        whole - rising[n] - share * (whole - rising[before]))
+                        whole - move - share * (whole - moved))
                     x = top - remaining * share
             elif inputs[n] < inputs[before]:
                 there = down[before]
@@ -96,10 +104,10 @@ def derivative(rising: np.ndarray, falling: np.ndarray, whole: np.ndarray, z: np
                     share = down[n] / there
                     by = share * by + x / there * (falling[n] - share * falling[before])
                     x *= share
-            if x < up[n]:
-                x, by = up[n], rising[n].copy()
+            if x < here:
+                x, by = here, move.copy()
             if x > down[n]:
                 x, by = down[n], falling[n].copy()
-            found[n] = by
+            found[n] = by / oriented[n]
         begin = end
     return found

@@ -9,10 +9,15 @@ falls, ``y = y0 D(u) / D(u0)`` with the falling branch D. A branch that begins i
 never meets the one it came from, and loops shift until they fit in between (Tanaka, Res Mechanica
 18 (1986) 251; Liang and Rogers, J. Intell. Mater. Syst. Struct. 1 (1990) 207).
 
+A low load orients but a share g of the martensite that forms, and the rest of it is twinned and
+gives no strain. Of what is not oriented, be it austenite or twinned, each branch orients that share
+anew (Brinson, J. Intell. Mater. Syst. Struct. 4 (1993) 229): the oriented share P goes as y does,
+with g R in the place of R, and the output is that of y = P / g.
+
 Table, after what every table begins with: the share, what the major loop gives beyond the output
 with all relays down, nodes per unit of the input, number of nodes; R and D at the nodes, evenly
-spaced from the lower end of the range, from 0 to 1; the table of the Preisach operator. Memory: y;
-the memory of the Preisach operator.
+spaced from the lower end of the range, from 0 to 1; the table of the Preisach operator. Memory: P;
+g, which is the load's and stays when the history is forgotten; the memory of the Preisach operator.
 """
 
 import math
@@ -21,13 +26,13 @@ import numpy as np
 
 from . import preisach
 from .layout import (
-    DIRECTION, HIGH, INPUT, LOW, LOWER, MEMORY, OUTPUT, SATURATED, SIGN, TABLE, TOLERANCE, UPPER)
+    DIRECTION, INPUT, LOWER, MEMORY, OUTPUT, SATURATED, SIGN, TABLE, TOLERANCE, UPPER)
 from .lean import lean
 
 SHARE, TOP, SCALE, COUNT = range(TABLE, TABLE + 4)
 BRANCHES = TABLE + 4
-TRANSFORMED = MEMORY
-INNER = MEMORY + 1
+TRANSFORMED, ORIENTED = MEMORY, MEMORY + 1
+INNER = MEMORY + 2
 
 # Shares of what transforms from which on none counts as left.
 LEAST = 1e-9
@@ -53,12 +58,12 @@ def _branch(table: np.ndarray, first: int, u: float) -> float:
 
 @lean
 def _transformed(table: np.ndarray, memory: np.ndarray, u: float) -> float:
-    """Return what has transformed, 0 to 1, once the input has come to one inside the range."""
+    """Return what is oriented, 0 to 1, once the input has come to one inside the range."""
     rising, falling = BRANCHES, BRANCHES + int(table[COUNT])
-    before, y = memory[INPUT], memory[TRANSFORMED]
-    low, high = _branch(table, rising, u), _branch(table, falling, u)
+    before, y, oriented = memory[INPUT], memory[TRANSFORMED], memory[ORIENTED]
+    low, high = min(_branch(table, rising, u), oriented), _branch(table, falling, u)
     if u > before:
-        left = 1.0 - _branch(table, rising, before)
+        left = 1.0 - min(_branch(table, rising, before), oriented)
         if left > LEAST:
             y = 1.0 - (1.0 - y) * (1.0 - low) / left
     elif u < before:
@@ -70,15 +75,24 @@ def _transformed(table: np.ndarray, memory: np.ndarray, u: float) -> float:
 
 @lean
 def output(table: np.ndarray, given: float, y: float) -> float:
-    """Return the output where the Preisach operator gives one, and y has transformed."""
+    """Return the output where the Preisach operator gives one, and y = P / g."""
     base = table[_inner(table) + preisach.BASE]
     scaled = base + table[SIGN] * table[TOP] * y
     return given + table[SHARE] * (scaled - given)
 
 
 @lean
+def orient(table: np.ndarray, memory: np.ndarray, oriented: float) -> None:
+    """Let a load orient a share of what forms from now on, and commit nothing else."""
+    if oriented != memory[ORIENTED]:
+        memory[ORIENTED] = oriented
+        memory[OUTPUT] = output(table, memory[INNER + OUTPUT],
+                                _transformed(table, memory, memory[INPUT]) / oriented)
+
+
+@lean
 def reset(table: np.ndarray, memory: np.ndarray) -> None:
-    """Forget the history: nothing has transformed, input at the lower end."""
+    """Forget the history: nothing has transformed, input at the lower end; the load stays."""
     preisach.reset(table[_inner(table):], memory[INNER:])
     memory[INPUT] = table[LOWER]
     memory[TRANSFORMED] = memory[SATURATED] = memory[DIRECTION] = 0.0
@@ -96,7 +110,7 @@ def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
             memory[DIRECTION] = 1.0 if u > memory[INPUT] else -1.0
         memory[INPUT] = u
         given = preisach.step(table[_inner(table):], memory[INNER:], u)
-        memory[OUTPUT] = output(table, given, memory[TRANSFORMED])
+        memory[OUTPUT] = output(table, given, memory[TRANSFORMED] / memory[ORIENTED])
     return memory[OUTPUT]
 
 
@@ -107,22 +121,22 @@ def peek(table: np.ndarray, memory: np.ndarray, u: float) -> float:
         return memory[OUTPUT]
     u = min(max(u, table[LOWER]), table[UPPER])
     given = preisach.peek(table[_inner(table):], memory[INNER:], u)
-    return output(table, given, _transformed(table, memory, u))
+    return output(table, given, _transformed(table, memory, u) / memory[ORIENTED])
 
 
 @lean
 def solve(table: np.ndarray, memory: np.ndarray, y: float) -> tuple[float, float, bool]:
     """Return the nearest input that gives a finite output, what it gives, and if out of reach."""
-    low, high, tolerance = table[LOW], table[HIGH], table[TOLERANCE]
-    saturated = not low - tolerance <= y <= high + tolerance
-    y = min(max(y, low), high)
+    tolerance = table[TOLERANCE]
     near, here = memory[INPUT], memory[OUTPUT] - y
     if abs(here) <= tolerance:
-        return near, memory[OUTPUT], saturated
+        return near, memory[OUTPUT], False
+    # Twinned martensite leaves room beyond the range of the major loop, and the more the less often
+    # it was oriented.
     far = table[UPPER] if here * table[SIGN] < 0.0 else table[LOWER]
     there = peek(table, memory, far) - y
     if here * there > 0.0:
-        return far, there + y, saturated
+        return far, there + y, abs(there) > tolerance
     # False position that halves the error of the end which stays (the Illinois algorithm).
     stays = 0
     for evaluated in range(MOST):
@@ -144,4 +158,4 @@ def solve(table: np.ndarray, memory: np.ndarray, y: float) -> tuple[float, float
             here *= 0.5 if stays == -1 else 1.0
             stays = -1
     u = near if abs(peek(table, memory, near) - y) <= abs(peek(table, memory, far) - y) else far
-    return u, peek(table, memory, u), saturated
+    return u, peek(table, memory, u), False

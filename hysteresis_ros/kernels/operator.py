@@ -24,6 +24,13 @@ def reset(table: np.ndarray, memory: np.ndarray) -> None:
 
 
 @lean
+def orient(table: np.ndarray, memory: np.ndarray, oriented: float) -> None:
+    """Let a load orient a share of what forms, where what has formed is scaled by kinetics."""
+    if table[KIND] == KINETIC:
+        kinetics.orient(table, memory, oriented)
+
+
+@lean
 def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     """Commit an input and return the output."""
     if table[KIND] == PREISACH:

@@ -7,6 +7,7 @@ import types
 
 # What kernels ask an operator for; its class answers in the place of the operator's memory.
 _ANSWERS: dict[str, Callable] = {
+    'orient': lambda table, operator, oriented: None,
     'reset': lambda table, operator: operator.reset(),
     'step': lambda table, operator, u: operator.step(u),
     'peek': lambda table, operator, u: operator.peek(u),

@@ -36,6 +36,7 @@ def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: f
             u = root.proceed(
                 motion, REST_SEARCH, _lacking(arm, state, line, u, x, offset, factor, play))
         motion[REST_GAIN] = min(max((u - start) / here, 0.5), 10.0)
+        _orient(arm, state, u, x, play)
         step(table, memory, u)
     output = last_output(table, memory) - arm.base
     k, share = _place(arm, state, line, output, offset, factor)
@@ -60,10 +61,19 @@ def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: floa
 
     `play` is the share of the play that is taken up: 0 where the muscle heats, 1 where it cools.
     """
+    _orient(arm, state, u, x, play)
     output = peek(arm.wires.table, state.memories[0], u)
     k, share = _place(arm, state, line, output - arm.base, offset, factor)
     load = grid.between(arm.grid, LOAD + LINE * line, k, share)
     return load - play * width(arm, line, k, share) - x - u
+
+
+@inlined
+def _orient(arm: Arm, state: State, u: float, x: float, play: float) -> None:
+    """Let the load under which H2 has an input orient its share; see `_lacking`."""
+    load = u + x
+    load += play * bundle.width_at(arm.wires, load)
+    bundle.orient_under(arm.wires, state.memories[0], state.muscles, 0, load)
 
 
 @inlined
@@ -162,7 +172,8 @@ def _lacking_held(arm: Arm, state: State, k: int, share: float, drag: float, x: 
     load = _required_held(arm, state, edge, k, share, part, dt)
     at_rest = _required_held(arm, state, edge, k, share, part, 0.0)
     output = arm.base + demand / factor
-    if arm.plays or arm.wires.kept != 0.0 or len(arm.wires.offsets) > 1:
+    if (arm.plays or arm.wires.kept != 0.0 or arm.wires.orients
+            or len(arm.wires.offsets) > 1):
         bundle.loads_for(arm.wires, state.memories, output, at_rest, load, x, state.muscles)
     else:
         state.muscles[0, BEYOND] = solve(arm.wires.table, state.memories[0], output)[0]

@@ -15,7 +15,7 @@ from . import grid, root
 from .arm import (
     Arm, INSIDE, LENGTH, LEVERAGE, LOOP, LOOSER, MOMENT, moved, NEAR_LENGTH, NEAR_LOAD,
     REST_SEARCH, SCALE, State, STRETCH, SWING_GAIN, THETA)
-from .bundle import TYPICAL_COMPLIANCE
+from .bundle import orient_under, TYPICAL_COMPLIANCE
 from .clip import clip
 from .formation import keep, parts
 from .lean import inlined, lean
@@ -67,6 +67,7 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
     if u + x < arm.loads[0, INSIDE]:
         u = arm.loads[0, INSIDE] - x
         k, share = _fly(arm, drag, slope)
+    orient_under(arm.wires, memory, state.muscles, 0, u + x)
     step(table, memory, _input(arm, state, u, x))
     if arm.wires.kept != 0.0:
         n, part = _load_at(arm, state, u, x)
@@ -116,6 +117,7 @@ def _muscle(arm: Arm, state: State, u: float, x: float, offset: float, factor: f
     # A loose muscle's load goes on falling, so that the root can be found.
     part = clip(part, 0.0, math.inf)
     scale = grid.between(arm.loads, SCALE, n, part)
+    orient_under(arm.wires, state.memories[0], state.muscles, 0, u + x)
     output = peek(arm.wires.table, state.memories[0], _input(arm, state, u, x))
     strained, held = parts(arm.wires.kept, state.muscles, 0, output - arm.base)
     return load, (arm.base + (scale * factor * strained + factor * held)

@@ -70,7 +70,7 @@ class Chain:
         # Those that make something of the load.
         self._shifting, self._playing = self._with('shift_load'), self._with('loop_width')
         self._scaling, self._stretching = self._with('scale'), self._with('stretch')
-        self._elastic = self._with('elastic_share')
+        self._elastic, self._orienting = self._with('elastic_share'), self._with('oriented')
         self.needs_phase = needs_phase(ordered)
         # A fan changes gain and time constant together (d1 stands in both).
         for effect in self.thermal:
@@ -228,6 +228,19 @@ class Chain:
     def kinetics(self) -> float:
         """Share, 0 to 1, of the transformation whose minor loops are scaled from the major one."""
         return min(sum((effect.kinetics for effect in self.material), 0.0), 1.0)
+
+    @property
+    def orients(self) -> bool:
+        """Whether branches orient anew what a load has left twinned; see `oriented`."""
+        return bool(self._orienting) and any(effect.orients_anew for effect in self.material)
+
+    def oriented(self, load: Values) -> Values:
+        """Return the share of what forms that is oriented, for branches that orient it anew."""
+        found = 1.0 + 0.0 * load
+        for effect in self._orienting:
+            found = found * effect.oriented(load, self.surroundings)
+        share = min(sum(effect.orients_anew for effect in self.material), 1.0)
+        return 1.0 - share * (1.0 - found)
 
     @property
     def plays(self) -> bool:

@@ -274,7 +274,7 @@ class Controller:
         return found
 
     def _at_rest(self) -> tuple[float, np.ndarray]:
-        """Angle of the cold arm, and what its muscles start from, shape (muscles, 4)."""
+        """Angle of the cold arm, and what its muscles start from, shape (muscles, 5)."""
         if self._rest is None:
             balance = self.model.balance(self.model.chain())
             angle = balance.settle(self._cold)

@@ -7,6 +7,8 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from hysteresis_ros.model.places import contracting, load_along
 from hysteresis_ros.operators import HysteresisOperator, Kinetic
 from hysteresis_ros.operators.preisach import Preisach
@@ -83,6 +85,29 @@ def cold_input(model: MuscleModel, chain: Chain, lower: float, upper: float) -> 
     first.reset()
     cold = load_along(model, chain, 1.0) - first.step(chain.to_drive_squared(model.cold_drive))
     return float(cold) if lower < cold < upper else upper
+
+
+def output_along(stage: HysteresisOperator, inputs: np.ndarray, oriented: np.ndarray
+                 ) -> np.ndarray:
+    """
+    Return what H2 gives from the cold state on.
+
+    Parameters
+    ----------
+    stage : HysteresisOperator
+        H2, whose memory is wiped first.
+    inputs : ndarray, shape (rows,)
+    oriented : ndarray, shape (rows,)
+        `Chain.oriented` of the load of each.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+    """
+    stage.reset()
+    if isinstance(stage, Kinetic):
+        return stage.simulate_under(inputs, oriented)
+    return stage.simulate(inputs)
 
 
 @functools.lru_cache(maxsize=MOST_STAGES)

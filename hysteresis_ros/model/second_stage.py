@@ -12,7 +12,7 @@ from hysteresis_ros.bicep.bundle import Bundle
 from hysteresis_ros.kernels import formation
 from hysteresis_ros.kernels.load_play import held
 from hysteresis_ros.model.chain import Chain
-from hysteresis_ros.operators import HysteresisOperator
+from hysteresis_ros.operators import HysteresisOperator, Kinetic
 
 # Elongation [m] by which elastic wires may leave the range of the transformation.
 ELASTIC_ROOM = 0.02
@@ -42,7 +42,7 @@ class SecondStage:
         self._chain, self._loaded = chain, loaded
         self._bundle = Bundle(operator, chain, loaded) if len(chain.offsets) > 1 else None
         self._operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
-        self._kept = chain.keeps_strain
+        self._kept, self._orients = chain.keeps_strain, chain.orients
         # The columns of `kernels.formation`, for each muscle.
         self._muscles = (self._bundle.muscles if self._bundle
                          else np.zeros((1, formation.SIZE)))
@@ -86,7 +86,7 @@ class SecondStage:
         ----------
         x, load : float
             Output of the first stage, and load that is borne, both cold.
-        cold : ndarray, shape (muscles, 4), optional
+        cold : ndarray, shape (muscles, 5), optional
             What the muscles start from, where that is known better.
         """
         self.reset()
@@ -104,6 +104,7 @@ class SecondStage:
         if self._bundle is not None:
             return self._bundle.drive(output, inside), False
         operator = self._operators[0]
+        self._orient(float(self._chain.oriented(np.float64(load))))
         found = operator.invert(self.given(output, load), dead_band=dead_band)
         play = width if found.input > operator.input else 0.0
         return self._sign * found.input + inside - play, found.saturated
@@ -120,7 +121,7 @@ class SecondStage:
         return float(self._chain.scale(np.float64(load)))
 
     def respond(self, x: float, load: float) -> tuple[float, np.ndarray]:
-        """Return the output [m] and what `step` would commit, shape (muscles, 4)."""
+        """Return the output [m] and what `step` would commit, shape (muscles, 5)."""
         inside, width = self._felt(load)
         if self._bundle is not None:
             return self._bundle.respond(
@@ -128,14 +129,23 @@ class SecondStage:
         u = self._sign * (x - inside)
         if width > 0.0:
             u = held(self._operators[0].input, u, width)
+        oriented = float(self._chain.oriented(np.float64(load)))
+        self._orient(oriented)
         output, following = self._operators[0].peek(u), self._muscles.copy()
-        following[0, formation.LOAD] = u
+        following[0, formation.LOAD], following[0, formation.ORIENTED] = u, oriented
         if not self._kept:
             return output, following
         given, scale = output - self.base, self._scale(load)
         strained, kept = formation.parts(self._kept, self._muscles, 0, given)
         formation.keep(following, 0, given, scale)
         return self.base + strained + kept / scale, following
+
+    def _orient(self, *oriented: float) -> None:
+        """Let the load of each muscle orient a share of what forms, where that depends on it."""
+        if self._orients:
+            for operator, share in zip(self._operators, oriented):
+                if isinstance(operator, Kinetic):
+                    operator.orient(share)
 
     def _felt(self, load: float) -> tuple[float, float]:
         """Return a load as the transformation feels it, and by how much it widens the loop."""
@@ -145,7 +155,8 @@ class SecondStage:
         return float(self._chain.load_inside(felt)), float(self._chain.loop_width(felt))
 
     def step(self, following: np.ndarray) -> None:
-        """Commit each muscle's input of H2, and what its martensite keeps, shape (muscles, 4)."""
+        """Commit each muscle's input of H2, and what its martensite keeps, shape (muscles, 5)."""
+        self._orient(*following[:, formation.ORIENTED].tolist())
         for operator, u in zip(self._operators, following[:, formation.LOAD].tolist()):
             operator.step(u)
         if self._kept:

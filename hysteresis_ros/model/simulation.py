@@ -21,6 +21,7 @@ from hysteresis_ros.kernels.thinned import balanced_rows, between
 from hysteresis_ros.model.agreement import Agreement, KnownPhases
 from hysteresis_ros.model.chain import Chain
 from hysteresis_ros.model.first_stage import FirstStage
+from hysteresis_ros.model.kinetic_stage import output_along
 from hysteresis_ros.model.onset import Past, rows_before, rows_of
 from hysteresis_ros.model.stepper import Stepper
 from hysteresis_ros.model.trials import Trial, trials_of
@@ -370,9 +371,9 @@ class Simulator:
         if chain.plays and first.loaded:
             width = chain.loop_width(trial.load)
             given = follow(given, np.concatenate((width[:1], width)), np.array([len(given)]))
-        stage.reset()
-        rest = stage.step(given[0])
-        output = stage.simulate(given[1:])
+        oriented = chain.oriented(trial.load) + 0.0 * trial.load
+        outputs = output_along(stage, given, np.concatenate((oriented[:1], oriented)))
+        rest, output = outputs[0], outputs[1:]
         base = stage.output_range[0]
         offset, factor = chain.drift(trial.drive, drive_squared, trial.inputs)
         scale, kept = chain.scale(trial.load), chain.keeps_strain

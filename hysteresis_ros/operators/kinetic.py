@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import ParameterError
 from ..kernels import kinetics as kernel, layout
+from ..kernels.operator import orient
 from .base import memory, number, resolution, take
 from .compiled import CompiledOperator
 from .preisach import Preisach
@@ -57,7 +58,54 @@ class Kinetic(CompiledOperator):
         self.preisach.reset()
         self.table = self._packed()
         self.memory = np.empty(kernel.INNER + len(preisach.memory))
+        self.memory[kernel.ORIENTED] = 1.0
         self.reset()
+
+    @property
+    def oriented(self) -> float:
+        """Share of what forms that the present load orients."""
+        return self.memory.item(kernel.ORIENTED)
+
+    def orient(self, oriented: float) -> None:
+        """
+        Let a load orient a share of what forms from now on.
+
+        Parameters
+        ----------
+        oriented : float
+            Above 0, up to 1.
+
+        Raises
+        ------
+        ParameterError
+            If it is out of range.
+        """
+        share = number(oriented, 'kinetic operator: oriented')
+        if not 0.0 < share <= 1.0:
+            raise ParameterError(f'kinetic operator: oriented is {share}: give one above 0 and up '
+                                 'to 1')
+        orient(self.table, self.memory, share)
+
+    def simulate_under(self, u: np.ndarray, oriented: np.ndarray) -> np.ndarray:
+        """
+        Commit a sequence of inputs under loads and return the outputs.
+
+        Parameters
+        ----------
+        u : ndarray, shape (M,)
+            Inputs, taken after those committed so far.
+        oriented : ndarray, shape (M,)
+            Share of what forms that the load of each orients.
+
+        Returns
+        -------
+        ndarray, shape (M,)
+        """
+        found = []
+        for place in np.split(np.arange(len(u)), np.flatnonzero(np.diff(oriented)) + 1):
+            self.orient(oriented[place[0]])
+            found.append(self.simulate(u[place]))
+        return np.concatenate(found)
 
     def _packed(self) -> np.ndarray:
         """Return the table of parameters."""
@@ -89,7 +137,7 @@ class Kinetic(CompiledOperator):
         """Return the memory: the input, what has transformed, and that of the Preisach operator."""
         return {'kind': self.kind, 'input': self.input, 'saturated': self.saturated,
                 'direction': self.direction,
-                'transformed': self.memory.item(kernel.TRANSFORMED),
+                'transformed': self.memory.item(kernel.TRANSFORMED), 'oriented': self.oriented,
                 'preisach': self._inside().save()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -99,14 +147,18 @@ class Kinetic(CompiledOperator):
         transformed = number(take(state, 'transformed', where), f'{where}: transformed')
         if not 0.0 <= transformed <= 1.0:
             raise ParameterError(f'{where}: transformed is {transformed}, not from 0 to 1')
+        # Before there were loads that orient a share, all was oriented.
+        oriented = number(state.get('oriented', 1.0), f'{where}: oriented')
+        if not 0.0 < oriented <= 1.0:
+            raise ParameterError(f'{where}: oriented is {oriented}, not above 0 and up to 1')
         inner = self._inside()
         inner.restore(take(state, 'preisach', where))
         if inner.input != u:
             raise ParameterError(f'{where}: input is {u}, but {inner.input} in its part preisach')
         snapshot = inner.snapshot()
         self.memory[kernel.INNER:kernel.INNER + len(snapshot)] = snapshot
-        self.memory[kernel.TRANSFORMED] = transformed
-        output = kernel.output(self.table, inner.output, transformed)
+        self.memory[kernel.TRANSFORMED], self.memory[kernel.ORIENTED] = transformed, oriented
+        output = kernel.output(self.table, inner.output, transformed / oriented)
         self.memory[:layout.MEMORY] = u, output, saturated, direction
 
     def to_dict(self) -> dict[str, Any]:
