@@ -18,6 +18,10 @@ from .formation import keep, LOAD as BEYOND, parts
 from .lean import inlined, lean
 from .operator import last_input, last_output, peek, solve, step
 
+# The loop's width changes by less than a third of a change of the load: each pass leaves less than
+# a third of the one before.
+WIDTH_PASSES = 8
+
 
 @inlined
 def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: float
@@ -72,7 +76,10 @@ def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: floa
 def _orient(arm: Arm, state: State, u: float, x: float, play: float) -> None:
     """Let the load under which H2 has an input orient its share; see `_lacking`."""
     load = u + x
-    load += play * bundle.width_at(arm.wires, load)
+    if arm.plays and arm.wires.orients:
+        # The load F = u + x + w(F) of a muscle whose play is taken up.
+        for _ in range(WIDTH_PASSES):
+            load = u + x + play * bundle.width_at(arm.wires, load)
     bundle.orient_under(arm.wires, state.memories[0], state.muscles, 0, load)
 
 
