@@ -113,8 +113,9 @@ def _orienting(fitter: BenchFitter, found: Sequence[Effect], plain: _Profile) ->
     others = [_Profile(fitter, found, start, orients=1.0, plain=plain)
               for start in _variations(fitter, as_found.fits[as_found.best].effects)]
     for other in others:
-        other.evaluate([as_found.best])
-    for other in sorted(others, key=lambda one: one.errors[as_found.best]):
+        # What another effect had stood for may have had a share of the kinetics' part, too.
+        other.evaluate([as_found.best, 1.0])
+    for other in sorted(others, key=lambda one: one.errors[one.best]):
         if other.proves(as_found):
             other.search()
             if other.shown() is not None:
@@ -225,8 +226,8 @@ class _Profile:
         return own
 
     def evaluate(self, shares: Sequence[float]) -> None:
-        """Fit the effects with some shares."""
-        for share in shares:
+        """Fit the effects with some shares, but for those that were."""
+        for share in [one for one in shares if one not in self.errors]:
             near = min(self.fits, key=lambda one: abs(one - share), default=None)
             starts = [self._start]
             if near is not None and len(self.fits[near].effects) == len(self._start):
