@@ -117,16 +117,12 @@ def test_what_is_oriented_survives_as_text():
     way = np.array([2.6, 0.9, 3.0, -1.0, 2.2])
     assert other.output == operator.output
     assert other.simulate(way).tolist() == operator.simulate(way).tolist()
-    # Before there were such loads, all was oriented.
-    del saved['oriented']
-    other.restore(saved)
-    assert other.oriented == 1.0
     for share in (0.0, 1.5, np.nan, 'half'):
         with pytest.raises(ParameterError, match='oriented'):
             other.restore({**saved, 'oriented': share})
         with pytest.raises(ParameterError, match='oriented'):
             other.orient(share)
-    assert other.oriented == 1.0
+    assert other.oriented == 0.7
 
 
 def orienting(*names, share=1.0, orients=1.0, growth=GROWTH):

@@ -5,7 +5,7 @@
 import numpy as np
 
 from .jit import jit
-from .kinetics import LEAST
+from .kinetics import ANEW, LEAST
 
 
 @jit
@@ -34,21 +34,23 @@ def transformed(rising: np.ndarray, falling: np.ndarray, whole: float, inputs: n
     found = np.empty(len(inputs))
     begin = 0
     for end in ends:
-        x = 0.0
+        x, formed, reverted = 0.0, 0.0, 0.0
         for n in range(begin, end):
-            before, most = n - 1, oriented[n] * whole
-            here = min(rising[n], most)
-            if n == begin:
-                x = here
-            elif inputs[n] > inputs[before]:
-                left = whole - min(rising[before], most)
-                if left > LEAST * whole:
-                    x = whole - (whole - x) * (whole - here) / left
-            elif inputs[n] < inputs[before]:
-                there = falling[before]
-                if there > LEAST * whole:
-                    x *= falling[n] / there
-            x = min(max(x, here), falling[n])
+            most, up, down = oriented[n] * whole, rising[n], falling[n]
+            here, counted = min(up, most), min(formed, most)
+            if n == begin or inputs[n] > inputs[n - 1]:
+                if here > counted and whole - counted > LEAST * whole:
+                    left = (whole - here) / (whole - counted)
+                    x = whole - (whole - x) * left
+                    reverted = down + (reverted - down) * left ** ANEW
+                formed = max(formed, up)
+            elif inputs[n] < inputs[n - 1]:
+                if down < reverted and reverted > LEAST * whole:
+                    left = down / reverted
+                    x *= left
+                    formed = up + (formed - up) * left ** ANEW
+                reverted = min(reverted, down)
+            x = min(max(x, here), down)
             found[n] = x / oriented[n]
         begin = end
     return found
@@ -81,31 +83,40 @@ def derivative(rising: np.ndarray, falling: np.ndarray, whole: np.ndarray, z: np
     """
     found = np.empty(rising.shape)
     up, down, top = rising @ z, falling @ z, whole @ z
-    begin = 0
+    begin, none = 0, np.zeros(len(z))
     for end in ends:
-        x, by = 0.0, np.zeros(len(z))
+        x, formed, reverted = 0.0, 0.0, 0.0
+        by, by_formed, by_reverted = none, none, none
         for n in range(begin, end):
-            before, most = n - 1, oriented[n] * top
-            here, move = (up[n], rising[n]) if up[n] < most else (most, oriented[n] * whole)
-            if n == begin:
-                x, by = here, move.copy()
-            elif inputs[n] > inputs[before]:
-                past, moved = (up[before], rising[before]) if up[before] < most else (
+            most = oriented[n] * top
+            here, by_here = (up[n], rising[n]) if up[n] < most else (most, oriented[n] * whole)
+            if n == begin or inputs[n] > inputs[n - 1]:
+                counted, by_counted = (formed, by_formed) if formed < most else (
                     most, oriented[n] * whole)
-                left = top - past
-                if left > LEAST * top:
-                    share, remaining = (top - here) / left, top - x
-                    by = whole - share * (whole - by) - remaining / left * (
-                        whole - move - share * (whole - moved))
-                    x = top - remaining * share
-            elif inputs[n] < inputs[before]:
-                there = down[before]
-                if there > LEAST * top:
-                    share = down[n] / there
-                    by = share * by + x / there * (falling[n] - share * falling[before])
-                    x *= share
+                if here > counted and top - counted > LEAST * top:
+                    left = (top - here) / (top - counted)
+                    by_left = (whole - by_here - left * (whole - by_counted)) / (top - counted)
+                    by = whole - left * (whole - by) - (top - x) * by_left
+                    x = top - (top - x) * left
+                    kept = left ** ANEW
+                    by_reverted = (falling[n] + kept * (by_reverted - falling[n])
+                                   + (reverted - down[n]) * ANEW * left ** (ANEW - 1.0) * by_left)
+                    reverted = down[n] + (reverted - down[n]) * kept
+                if up[n] > formed:
+                    formed, by_formed = up[n], rising[n].copy()
+            elif inputs[n] < inputs[n - 1] and down[n] < reverted:
+                if reverted > LEAST * top:
+                    left = down[n] / reverted
+                    by_left = (falling[n] - left * by_reverted) / reverted
+                    by = left * by + x * by_left
+                    x *= left
+                    kept = left ** ANEW
+                    by_formed = (rising[n] + kept * (by_formed - rising[n])
+                                 + (formed - up[n]) * ANEW * left ** (ANEW - 1.0) * by_left)
+                    formed = up[n] + (formed - up[n]) * kept
+                reverted, by_reverted = down[n], falling[n].copy()
             if x < here:
-                x, by = here, move.copy()
+                x, by = here, by_here.copy()
             if x > down[n]:
                 x, by = down[n], falling[n].copy()
             found[n] = by / oriented[n]

@@ -7,7 +7,10 @@ What transforms is in proportion to what has still to transform. While the input
 ``1 - y = (1 - y0) (1 - R(u)) / (1 - R(u0))`` with the rising branch R of the major loop; while it
 falls, ``y = y0 D(u) / D(u0)`` with the falling branch D. A branch that begins inside the major loop
 never meets the one it came from, and loops shift until they fit in between (Tanaka, Res Mechanica
-18 (1986) 251; Liang and Rogers, J. Intell. Mater. Syst. Struct. 1 (1990) 207).
+18 (1986) 251; Liang and Rogers, J. Intell. Mater. Syst. Struct. 1 (1990) 207). While nothing goes
+back, nothing can form anew: an input that falls without reaching D, and rises again, goes on where
+it was, as in these papers. So R(u0) and D(u0) are those of the farthest input of this direction,
+which begins anew by as much as has transformed in the other one.
 
 A low load orients but a share g of the martensite that forms, and the rest of it is twinned and
 gives no strain. Of what is not oriented, be it austenite or twinned, each branch orients that share
@@ -17,7 +20,8 @@ with g R in the place of R, and the output is that of y = P / g.
 Table, after what every table begins with: the share, what the major loop gives beyond the output
 with all relays down, nodes per unit of the input, number of nodes; R and D at the nodes, evenly
 spaced from the lower end of the range, from 0 to 1; the table of the Preisach operator. Memory: P;
-g, which is the load's and stays when the history is forgotten; the memory of the Preisach operator.
+g, which is the load's and stays when the history is forgotten; R and D of the farthest inputs; the
+memory of the Preisach operator.
 """
 
 import math
@@ -31,11 +35,14 @@ from .lean import lean
 
 SHARE, TOP, SCALE, COUNT = range(TABLE, TABLE + 4)
 BRANCHES = TABLE + 4
-TRANSFORMED, ORIENTED = MEMORY, MEMORY + 1
-INNER = MEMORY + 2
+TRANSFORMED, ORIENTED, FORMED, REVERTED = range(MEMORY, MEMORY + 4)
+INNER = MEMORY + 4
 
 # Shares of what transforms from which on none counts as left.
 LEAST = 1e-9
+# The other direction begins anew by exp(-ANEW q) where a share q has transformed: a hundredth, below
+# which no error of a bench matters, is the end of a branch that weights have smoothed.
+ANEW = 100.0
 # Outputs that the inverse evaluates at most: by halves alone an input would be exact to 2^-60.
 MOST = 60
 
@@ -57,20 +64,26 @@ def _branch(table: np.ndarray, first: int, u: float) -> float:
 
 
 @lean
-def _transformed(table: np.ndarray, memory: np.ndarray, u: float) -> float:
-    """Return what is oriented, 0 to 1, once the input has come to one inside the range."""
+def _moved(table: np.ndarray, memory: np.ndarray, u: float) -> tuple[float, float, float]:
+    """Return P, and R and D of the farthest inputs, once the input is at one inside the range."""
     rising, falling = BRANCHES, BRANCHES + int(table[COUNT])
     before, y, oriented = memory[INPUT], memory[TRANSFORMED], memory[ORIENTED]
-    low, high = min(_branch(table, rising, u), oriented), _branch(table, falling, u)
+    formed, reverted = memory[FORMED], memory[REVERTED]
+    branch, high = _branch(table, rising, u), _branch(table, falling, u)
+    low, counted = min(branch, oriented), min(formed, oriented)
     if u > before:
-        left = 1.0 - min(_branch(table, rising, before), oriented)
-        if left > LEAST:
-            y = 1.0 - (1.0 - y) * (1.0 - low) / left
+        if low > counted and 1.0 - counted > LEAST:
+            left = (1.0 - low) / (1.0 - counted)
+            y = 1.0 - (1.0 - y) * left
+            reverted = high + (reverted - high) * left ** ANEW
+        formed = max(formed, branch)
     elif u < before:
-        there = _branch(table, falling, before)
-        if there > LEAST:
-            y *= high / there
-    return min(max(y, low), high)
+        if high < reverted and reverted > LEAST:
+            left = high / reverted
+            y *= left
+            formed = branch + (formed - branch) * left ** ANEW
+        reverted = min(reverted, high)
+    return min(max(y, low), high), formed, reverted
 
 
 @lean
@@ -87,7 +100,7 @@ def orient(table: np.ndarray, memory: np.ndarray, oriented: float) -> None:
     if oriented != memory[ORIENTED]:
         memory[ORIENTED] = oriented
         memory[OUTPUT] = output(table, memory[INNER + OUTPUT],
-                                _transformed(table, memory, memory[INPUT]) / oriented)
+                                _moved(table, memory, memory[INPUT])[0] / oriented)
 
 
 @lean
@@ -96,6 +109,7 @@ def reset(table: np.ndarray, memory: np.ndarray) -> None:
     preisach.reset(table[_inner(table):], memory[INNER:])
     memory[INPUT] = table[LOWER]
     memory[TRANSFORMED] = memory[SATURATED] = memory[DIRECTION] = 0.0
+    memory[FORMED] = memory[REVERTED] = 0.0
     memory[OUTPUT] = output(table, memory[INNER + OUTPUT], 0.0)
 
 
@@ -105,7 +119,7 @@ def step(table: np.ndarray, memory: np.ndarray, u: float) -> float:
     memory[SATURATED] = 0.0 if table[LOWER] <= u <= table[UPPER] else 1.0
     if not math.isnan(u):
         u = min(max(u, table[LOWER]), table[UPPER])
-        memory[TRANSFORMED] = _transformed(table, memory, u)
+        memory[TRANSFORMED], memory[FORMED], memory[REVERTED] = _moved(table, memory, u)
         if u != memory[INPUT]:
             memory[DIRECTION] = 1.0 if u > memory[INPUT] else -1.0
         memory[INPUT] = u
@@ -121,7 +135,7 @@ def peek(table: np.ndarray, memory: np.ndarray, u: float) -> float:
         return memory[OUTPUT]
     u = min(max(u, table[LOWER]), table[UPPER])
     given = preisach.peek(table[_inner(table):], memory[INNER:], u)
-    return output(table, given, _transformed(table, memory, u) / memory[ORIENTED])
+    return output(table, given, _moved(table, memory, u)[0] / memory[ORIENTED])
 
 
 @lean

@@ -138,17 +138,20 @@ class Kinetic(CompiledOperator):
         return {'kind': self.kind, 'input': self.input, 'saturated': self.saturated,
                 'direction': self.direction,
                 'transformed': self.memory.item(kernel.TRANSFORMED), 'oriented': self.oriented,
+                'formed': self.memory.item(kernel.FORMED),
+                'reverted': self.memory.item(kernel.REVERTED),
                 'preisach': self._inside().save()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take over what `save` returned; ParameterError if it is something else."""
         u, saturated, where = memory(state, self)
         direction = number(take(state, 'direction', where), f'{where}: direction')
-        transformed = number(take(state, 'transformed', where), f'{where}: transformed')
-        if not 0.0 <= transformed <= 1.0:
-            raise ParameterError(f'{where}: transformed is {transformed}, not from 0 to 1')
-        # Before there were loads that orient a share, all was oriented.
-        oriented = number(state.get('oriented', 1.0), f'{where}: oriented')
+        shares = [number(take(state, name, where), f'{where}: {name}')
+                  for name in ('transformed', 'formed', 'reverted')]
+        for name, share in zip(('transformed', 'formed', 'reverted'), shares):
+            if not 0.0 <= share <= 1.0:
+                raise ParameterError(f'{where}: {name} is {share}, not from 0 to 1')
+        oriented = number(take(state, 'oriented', where), f'{where}: oriented')
         if not 0.0 < oriented <= 1.0:
             raise ParameterError(f'{where}: oriented is {oriented}, not above 0 and up to 1')
         inner = self._inside()
@@ -157,8 +160,9 @@ class Kinetic(CompiledOperator):
             raise ParameterError(f'{where}: input is {u}, but {inner.input} in its part preisach')
         snapshot = inner.snapshot()
         self.memory[kernel.INNER:kernel.INNER + len(snapshot)] = snapshot
-        self.memory[kernel.TRANSFORMED], self.memory[kernel.ORIENTED] = transformed, oriented
-        output = kernel.output(self.table, inner.output, transformed / oriented)
+        self.memory[kernel.TRANSFORMED], self.memory[kernel.ORIENTED] = shares[0], oriented
+        self.memory[kernel.FORMED], self.memory[kernel.REVERTED] = shares[1:]
+        output = kernel.output(self.table, inner.output, shares[0] / oriented)
         self.memory[:layout.MEMORY] = u, output, saturated, direction
 
     def to_dict(self) -> dict[str, Any]:
