@@ -40,9 +40,10 @@ INNER = MEMORY + 4
 
 # Shares of what transforms from which on none counts as left.
 LEAST = 1e-9
-# The other direction begins anew by exp(-ANEW q) where a share q has transformed: a hundredth, below
-# which no error of a bench matters, is the end of a branch that weights have smoothed.
-ANEW = 100.0
+# The other direction begins anew but for (1 - q)^ANEW where a share q has transformed. With weights
+# on 30 to 50 levels the end of a branch is smoothed over two or three hundredths; with 100 the
+# response turns so sharply that fits of the weights get stuck on Brinson's and Tanaka's wires.
+ANEW = 30.0
 # Outputs that the inverse evaluates at most: by halves alone an input would be exact to 2^-60.
 MOST = 60
 
