@@ -82,6 +82,27 @@ def test_minor_loops_shift_until_they_fit_in_and_those_of_a_preisach_operator_cl
     assert half == pytest.approx(0.5 * (along(tanaka(), *loops) + along(tanaka(0.0), *loops)))
 
 
+@pytest.mark.parametrize('way, turn', [((-3.0, 2.4), 1.7), ((-3.0, 5.0, 1.1), 1.8)])
+def test_nothing_transforms_anew_where_nothing_went_the_other_way(way, turn):
+    """A swing between the two branches is as if it had not been, both ways."""
+    direct, swung = tanaka(), tanaka()
+    here = along(direct, *way)[-1]
+    assert 0.1 < here < 0.9
+    assert along(swung, *way, turn, way[-1])[-2:] == pytest.approx([here, here], abs=1e-3)
+    further = 2.0 * way[-1] - turn
+    assert along(swung, *way, turn, further)[-1] == pytest.approx(
+        along(direct, *way, further)[-1], abs=2e-3)
+
+
+def test_a_turn_counts_anew_by_what_has_gone_back():
+    """After a hundredth in part, after a tenth altogether, and the more the further."""
+    deep = FALLS - np.linspace(0.0, 0.1, 11)
+    again = np.array([along(tanaka(), -3.0, 2.4, turn, 2.4)[-1] for turn in deep])
+    anew = 1.0 - (1.0 - along(tanaka(), -3.0, 2.4, deep[-1])[-1]) * np.exp(-1.5 * (2.4 - RISES))
+    assert np.all(np.diff(again[:4]) > 0.0)
+    assert again[-1] == pytest.approx(anew, abs=0.02) and again[-1] > again[0] + 0.1
+
+
 @settings(max_examples=40, deadline=None)
 @given(share=st.floats(0.0, 1.0), top=st.floats(2.0, 4.0), sign=st.sampled_from([1.0, -1.0]),
        seed=st.integers(0, 1000))

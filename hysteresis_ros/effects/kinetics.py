@@ -29,8 +29,9 @@ class Kinetics(MaterialEffect):
                 'loops do not close.')
     equation = ('y = (1 - share) H2[u] + share Y, dY = (Y1 - Y) dR / (Y1 - R) while u rises and '
                 'dY = Y dD / D while it falls, with the branches R(u) and D(u) of the major loop '
-                'of H2 and its upper end Y1; with orients g Y in the place of Y and g R in that of '
-                'R while u rises, g = 1 - r s(F) of stress_dependent_strain')
+                'of H2 and its upper end Y1, each counted on from the farthest u since anything '
+                'went the other way; with orients g Y in the place of Y and min(R, g Y1) in that '
+                'of R, g = 1 - r s(F) of stress_dependent_strain')
     source = ('Tanaka, Res Mechanica 18 (1986) 251; Liang and Rogers, J. Intell. Mater. Syst. '
               'Struct. 1 (1990) 207; orients: Brinson, J. Intell. Mater. Syst. Struct. 4 (1993) '
               '229')

@@ -37,18 +37,21 @@ def transformed(rising: np.ndarray, falling: np.ndarray, whole: float, inputs: n
         x, formed, reverted = 0.0, 0.0, 0.0
         for n in range(begin, end):
             most, up, down = oriented[n] * whole, rising[n], falling[n]
-            here, counted = min(up, most), min(formed, most)
-            if n == begin or inputs[n] > inputs[n - 1]:
+            here, before = min(up, most), max(n - 1, begin)
+            if n == begin or inputs[n] > inputs[before]:
+                counted = formed if n == begin else max(formed, rising[before])
+                counted = min(counted, most)
                 if here > counted and whole - counted > LEAST * whole:
                     left = (whole - here) / (whole - counted)
                     x = whole - (whole - x) * left
-                    reverted = down + (reverted - down) * left ** ANEW
+                    reverted = whole - (whole - reverted) * left ** ANEW
                 formed = max(formed, up)
-            elif inputs[n] < inputs[n - 1]:
-                if down < reverted and reverted > LEAST * whole:
-                    left = down / reverted
+            elif inputs[n] < inputs[before]:
+                counted = min(reverted, falling[before])
+                if down < counted and counted > LEAST * whole:
+                    left = down / counted
                     x *= left
-                    formed = up + (formed - up) * left ** ANEW
+                    formed *= left ** ANEW
                 reverted = min(reverted, down)
             x = min(max(x, here), down)
             found[n] = x / oriented[n]
@@ -90,31 +93,37 @@ def derivative(rising: np.ndarray, falling: np.ndarray, whole: np.ndarray, z: np
         for n in range(begin, end):
             most = oriented[n] * top
             here, by_here = (up[n], rising[n]) if up[n] < most else (most, oriented[n] * whole)
-            if n == begin or inputs[n] > inputs[n - 1]:
-                counted, by_counted = (formed, by_formed) if formed < most else (
-                    most, oriented[n] * whole)
+            before = max(n - 1, begin)
+            if n == begin or inputs[n] > inputs[before]:
+                counted, by_counted = formed, by_formed
+                if n > begin and up[before] > formed:
+                    counted, by_counted = up[before], rising[before]
+                if counted > most:
+                    counted, by_counted = most, oriented[n] * whole
                 if here > counted and top - counted > LEAST * top:
                     left = (top - here) / (top - counted)
                     by_left = (whole - by_here - left * (whole - by_counted)) / (top - counted)
                     by = whole - left * (whole - by) - (top - x) * by_left
                     x = top - (top - x) * left
-                    kept = left ** ANEW
-                    by_reverted = (falling[n] + kept * (by_reverted - falling[n])
-                                   + (reverted - down[n]) * ANEW * left ** (ANEW - 1.0) * by_left)
-                    reverted = down[n] + (reverted - down[n]) * kept
+                    kept, by_kept = left ** ANEW, ANEW * left ** (ANEW - 1.0) * by_left
+                    by_reverted = whole - kept * (whole - by_reverted) - (top - reverted) * by_kept
+                    reverted = top - (top - reverted) * kept
                 if up[n] > formed:
                     formed, by_formed = up[n], rising[n].copy()
-            elif inputs[n] < inputs[n - 1] and down[n] < reverted:
-                if reverted > LEAST * top:
-                    left = down[n] / reverted
-                    by_left = (falling[n] - left * by_reverted) / reverted
+            elif inputs[n] < inputs[before]:
+                counted, by_counted = reverted, by_reverted
+                if down[before] < reverted:
+                    counted, by_counted = down[before], falling[before]
+                if down[n] < counted and counted > LEAST * top:
+                    left = down[n] / counted
+                    by_left = (falling[n] - left * by_counted) / counted
                     by = left * by + x * by_left
                     x *= left
-                    kept = left ** ANEW
-                    by_formed = (rising[n] + kept * (by_formed - rising[n])
-                                 + (formed - up[n]) * ANEW * left ** (ANEW - 1.0) * by_left)
-                    formed = up[n] + (formed - up[n]) * kept
-                reverted, by_reverted = down[n], falling[n].copy()
+                    kept, by_kept = left ** ANEW, ANEW * left ** (ANEW - 1.0) * by_left
+                    by_formed = kept * by_formed + formed * by_kept
+                    formed *= kept
+                if down[n] < reverted:
+                    reverted, by_reverted = down[n], falling[n].copy()
             if x < here:
                 x, by = here, by_here.copy()
             if x > down[n]:

@@ -15,7 +15,7 @@ which begins anew by as much as has transformed in the other one.
 A low load orients but a share g of the martensite that forms, and the rest of it is twinned and
 gives no strain. Of what is not oriented, be it austenite or twinned, each branch orients that share
 anew (Brinson, J. Intell. Mater. Syst. Struct. 4 (1993) 229): the oriented share P goes as y does,
-with g R in the place of R, and the output is that of y = P / g.
+with min(R, g) in the place of R, and the output is that of y = P / g.
 
 Table, after what every table begins with: the share, what the major loop gives beyond the output
 with all relays down, nodes per unit of the input, number of nodes; R and D at the nodes, evenly
@@ -71,18 +71,20 @@ def _moved(table: np.ndarray, memory: np.ndarray, u: float) -> tuple[float, floa
     before, y, oriented = memory[INPUT], memory[TRANSFORMED], memory[ORIENTED]
     formed, reverted = memory[FORMED], memory[REVERTED]
     branch, high = _branch(table, rising, u), _branch(table, falling, u)
-    low, counted = min(branch, oriented), min(formed, oriented)
+    low = min(branch, oriented)
     if u > before:
+        counted = min(max(formed, _branch(table, rising, before)), oriented)
         if low > counted and 1.0 - counted > LEAST:
             left = (1.0 - low) / (1.0 - counted)
             y = 1.0 - (1.0 - y) * left
-            reverted = high + (reverted - high) * left ** ANEW
+            reverted = 1.0 - (1.0 - reverted) * left ** ANEW
         formed = max(formed, branch)
     elif u < before:
-        if high < reverted and reverted > LEAST:
-            left = high / reverted
+        counted = min(reverted, _branch(table, falling, before))
+        if high < counted and counted > LEAST:
+            left = high / counted
             y *= left
-            formed = branch + (formed - branch) * left ** ANEW
+            formed *= left ** ANEW
         reverted = min(reverted, high)
     return min(max(y, low), high), formed, reverted
 
