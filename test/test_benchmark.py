@@ -66,6 +66,7 @@ def test_a_benchmark_has_a_process_of_its_own(tmp_path, monkeypatch, capfd):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_every_benchmark_runs(root, tmp_path):
     """The quick form measures the same names, but for those of the long diagnoses."""
     pytest.importorskip('rclpy')

@@ -59,6 +59,7 @@ def test_the_load_that_a_plain_operator_does_not_know_is_found(data, alloy):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_an_alloy_expands_with_its_temperature(data):
     """NiTiHf: between the stresses that are fitted half of the error was the expansion."""
     training, held_out, _ = ALLOYS['nitihf']

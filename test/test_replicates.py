@@ -86,6 +86,7 @@ def test_trials_are_left_out_where_all_have_one_load_and_parts_of_a_single_trial
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_effects_of_a_bench_are_the_same_to_the_bit_whatever_the_jobs(tables, forkable):
     """Weights begin with those found before all fits that are shared, not with the last one's."""
     rows = tables[0].select(range(4))
