@@ -249,6 +249,9 @@ def test_a_bench_shows_it_and_that_a_growth_was_in_part_a_softer_martensite(
     assert kinetics.orients == proven and ('phase_modulus' in names) == proven
     assert names >= {effect.id for effect in model.effects}
     if proven:
+        # What was left out, as rows did not determine it, does not come back.
+        without = shown_kinetics(fitter, model.effects, ['phase_modulus'])
+        assert 'phase_modulus' not in {effect.id for effect in without.effects}
         assert kinetics.share >= 0.75 and shown.after < 0.5 * shown.before
         whole = fitter.problem.completed(shown.effects)
         verified = [np.std((one.predict(length) - length.column('length'))[

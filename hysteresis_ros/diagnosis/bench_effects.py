@@ -22,7 +22,7 @@ from hysteresis_ros.diagnosis.discrepancy import FEWEST_LOADS
 from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import located
-from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.parameters import universal, usual
 from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
@@ -135,7 +135,7 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
     if ThermalExpansion.id not in excluded:
         known = with_expansion(BenchFitter(problem.finer()), known, Settings().practical)
     if Kinetics.id not in excluded:
-        shown = shown_kinetics(BenchFitter(problem.finer()), known)
+        shown = shown_kinetics(BenchFitter(problem.finer()), known, excluded)
         known = shown.effects if shown else known
     if not known:
         return model, []
@@ -187,10 +187,7 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], problem: BenchP
     """
     fitter = BenchFitter(problem.finer())
     names = [effect.id for effect in found]
-    rest = usual([kind(model.surroundings) for name, kind in catalogue().items()
-                  if kind.universal and name not in (*names, *excluded)
-                  and kind.available(model.surroundings)],
-                 'bench')
+    rest = universal(model.surroundings, (*names, *excluded))
     if not rest:
         return list(found)
     practical = Settings().practical

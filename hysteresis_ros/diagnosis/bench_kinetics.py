@@ -12,7 +12,7 @@ other effects are known, because each wire has kinetics and no other effect stan
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 import dataclasses
 
 import numpy as np
@@ -23,10 +23,10 @@ from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.forms import other_forms, simplest_forms
-from hysteresis_ros.diagnosis.parameters import usual
+from hysteresis_ros.diagnosis.parameters import universal
 from hysteresis_ros.diagnosis.significance import (
     independent_rows, schwarz_log_odds, SIGNIFICANCE)
-from hysteresis_ros.effects import catalogue, Effect
+from hysteresis_ros.effects import Effect
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.measurements.turns import turns
 from hysteresis_ros.model.chain import Chain
@@ -53,7 +53,8 @@ class BenchKinetics:
     after: float
 
 
-def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetics | None:
+def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect], excluded: Collection[str] = ()
+                   ) -> BenchKinetics | None:
     """
     Return the effects found on a bench with the kinetics of the wire.
 
@@ -63,6 +64,8 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetic
         Rows, and a model without the effects.
     found : sequence of Effect
         Effects with values.
+    excluded : collection of str
+        Effects that are not to be sought with them.
 
     Returns
     -------
@@ -76,15 +79,16 @@ def shown_kinetics(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetic
     if (Kinetics.id in known or not Kinetics.available(surroundings)
             or not _has_minor_loops(problem)):
         return None
-    shown = _shown(fitter, found)
+    shown = _shown(fitter, found, excluded)
     finest = problem.finest([*fitter.fixed, *found])
     if shown is None and finest.levels > problem.levels:
         # Coarse weights follow fewer minor loops one by one, fine ones less of a steep branch.
-        shown = _shown(fitter.on(finest), found)
+        shown = _shown(fitter.on(finest), found, excluded)
     return shown
 
 
-def _shown(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetics | None:
+def _shown(fitter: BenchFitter, found: Sequence[Effect], excluded: Collection[str]
+           ) -> BenchKinetics | None:
     """Return what `shown_kinetics` does, with the weights of one problem."""
     with np.errstate(all='ignore'):
         profile = _Profile(fitter, found)
@@ -92,13 +96,14 @@ def _shown(fitter: BenchFitter, found: Sequence[Effect]) -> BenchKinetics | None
         surroundings = fitter.problem.model.surroundings
         if Chain([*fitter.fixed, *found, Kinetics(surroundings, share=1.0, orients=1.0)],
                  surroundings).orients:
-            profile = _orienting(fitter, found, profile)
+            profile = _orienting(fitter, found, profile, excluded)
         if profile.best == 0.0 or not profile.proves():
             return None
         return profile.shown()
 
 
-def _orienting(fitter: BenchFitter, found: Sequence[Effect], plain: _Profile) -> _Profile:
+def _orienting(fitter: BenchFitter, found: Sequence[Effect], plain: _Profile,
+               excluded: Collection[str]) -> _Profile:
     """
     Return the profile of branches that orient anew what a low load has left twinned, if it shows.
 
@@ -111,7 +116,7 @@ def _orienting(fitter: BenchFitter, found: Sequence[Effect], plain: _Profile) ->
     if as_found.best == 0.0 or not as_found.proves(plain):
         return plain
     others = [_Profile(fitter, found, start, orients=1.0, plain=plain)
-              for start in _variations(fitter, as_found.fits[as_found.best].effects)]
+              for start in _variations(fitter, as_found.fits[as_found.best].effects, excluded)]
     for other in others:
         # What another effect had stood for may have had a share of the kinetics' part, too.
         other.evaluate([as_found.best, 1.0])
@@ -123,17 +128,16 @@ def _orienting(fitter: BenchFitter, found: Sequence[Effect], plain: _Profile) ->
     return as_found if as_found.shown() is not None else plain
 
 
-def _variations(fitter: BenchFitter, effects: Sequence[Effect]) -> list[list[Effect]]:
+def _variations(fitter: BenchFitter, effects: Sequence[Effect], excluded: Collection[str]
+                ) -> list[list[Effect]]:
     """Return effects in other forms, and each with one more that every loaded muscle has."""
     surroundings = fitter.problem.model.surroundings
     known = {effect.id for effect in (*fitter.fixed, *effects)}
-    universal = usual([kind(surroundings) for name, kind in catalogue().items()
-                       if kind.universal and name not in known and kind.available(surroundings)],
-                      'bench')
+    more = universal(surroundings, {*known, *excluded})
     found = []
     for forms in ({}, *other_forms(effects), *filter(None, [simplest_forms(effects)])):
         formed = [effect.with_values(**forms.get(effect.id, {})) for effect in effects]
-        found += [formed, *([*formed, one] for one in universal)]
+        found += [formed, *([*formed, one] for one in more)]
     return found[1:]
 
 

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Free parameters of effects as one vector that an optimiser can move."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 import itertools
 import math
 
 import numpy as np
 
-from hysteresis_ros.effects import Effect, Parameter
+from hysteresis_ros.effects import catalogue, Effect, Parameter, Surroundings
 
 
 class ParameterVector:
@@ -153,6 +153,12 @@ def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
     names = {parameter.name for parameter in fitted}
     return starts + [starts[0].with_values(**guess) for guess in guesses
                      if names.issuperset(guess)]
+
+
+def universal(surroundings: Surroundings, but: Collection[str]) -> list[Effect]:
+    """Return what every loaded muscle has on a bench, at usual values, but for some by name."""
+    return usual([kind(surroundings) for name, kind in catalogue().items()
+                  if kind.universal and name not in but and kind.available(surroundings)], 'bench')
 
 
 def usual(effects: Sequence[Effect], kind: str) -> list[Effect]:
