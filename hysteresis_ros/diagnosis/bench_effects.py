@@ -14,6 +14,7 @@ from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_expansion import with_expansion
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_kinetics import shown_kinetics
+from hysteresis_ros.diagnosis.bench_overlooked import with_overlooked
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.between_loads import best_between_loads
 from hysteresis_ros.diagnosis.determined import not_determined
@@ -59,7 +60,8 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
         The bench tables; `force` only for the metrics.
     names : sequence of str, optional
         Effects to add; by default those that the length table proves, and with them those that
-        every loaded muscle has, and kinetics, where loads held out show them.
+        every loaded muscle has, and kinetics, where loads held out show them, and what rows and
+        loads left out show besides.
     length_trials, force_trials : sequence of numbers, optional
         Trials that are fitted; the others verify.
     jobs : int
@@ -139,6 +141,7 @@ def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequ
         known = shown.effects if shown else known
     if not known:
         return model, []
+    known = with_overlooked(BenchFitter(problem.finer()), known, excluded, Settings().practical)
     return extended_model(model, [one.id for one in known], problem.measurements, known)
 
 

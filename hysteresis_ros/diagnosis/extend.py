@@ -282,7 +282,11 @@ def _fitted_together(problem: BenchProblem, model: MuscleModel, classes: Sequenc
              if (can_be_located(effect, kind) or isinstance(effect, Kinetics))
              and not not_determined(effect, kind)}
     if fixed:
-        return with_best_forms(fitter, known, fixed)
+        added = with_best_forms(fitter, known, fixed)
+        # A form that rows do not determine says less than one that they do.
+        vague = {effect.id for effect in added if not_determined(effect, kind)}
+        vague -= {effect.id for effect in known if not_determined(effect, kind)}
+        return with_best_forms(fitter, known, fixed | vague) if vague else added
     added = with_best_forms(fitter, _on_bench(problem, model, classes)[-1][0])
     if not known:
         return added

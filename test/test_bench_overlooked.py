@@ -1,0 +1,104 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a set of effects of a bench lacks, by rows and loads that are left out."""
+
+from model_support import effect_of, with_noise
+import numpy as np
+import pytest
+from test_bench_expansion import NOISE, PRACTICAL
+from test_bench_kinetics import fitter_of, LOADS, USUAL
+
+from hysteresis_ros.diagnosis import bench_overlooked
+from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.bench_overlooked import with_overlooked
+from hysteresis_ros.identification.bench import identify
+from hysteresis_ros.laboratory.experiments import bench_tables
+from hysteresis_ros.laboratory.sequences import damped_oscillation
+from hysteresis_ros.measurements import Measurement
+
+TRIALS = {'length_trials': range(4), 'force_trials': [0]}
+
+
+@pytest.fixture(scope='module')
+def usual():
+    """Return a model of a wire with what every loaded muscle has."""
+    force, length = (Measurement.from_columns(bench_tables({}, 11)[name])
+                     for name in ('force.csv', 'length.csv'))
+    plain = identify(length, force, **TRIALS).model
+    return add_effects(plain, length, force, USUAL, **TRIALS)[0]
+
+
+def made(model, own=(), seed=0):
+    """Return lengths of that wire with effects of its own, on the bench of the paper."""
+    drive = damped_oscillation()
+    columns = {'trial': np.repeat(np.arange(float(len(LOADS))), len(drive)),
+               'voltage': np.tile(drive, len(LOADS)), 'force': np.repeat(LOADS, len(drive))}
+    clean = Measurement.from_columns({**columns, 'length': np.zeros(len(drive) * len(LOADS))})
+    lengths = model.with_effects([*model.effects, *own]).predict(clean)
+    return with_noise(Measurement.from_columns({**columns, 'length': lengths}),
+                      NOISE * np.random.default_rng(seed).standard_normal(len(lengths)))
+
+
+def added(usual, own=(), known=None, excluded=(), seed=0):
+    known = usual.effects if known is None else known
+    found = with_overlooked(fitter_of(usual, made(usual, own, seed)), known, excluded, PRACTICAL)
+    return {effect.id: effect for effect in found
+            if effect.id not in {one.id for one in known}}
+
+
+def slopes(usual, g=0.2):
+    return [effect_of(usual, 'transformation_slopes', g=g)]
+
+
+def test_what_is_missing_is_found_in_its_size(usual):
+    found = added(usual, slopes(usual))
+    assert list(found) == ['transformation_slopes']
+    assert found['transformation_slopes'].g == pytest.approx(0.2, rel=0.1)
+    assert 'g' in found['transformation_slopes'].intervals
+
+
+@pytest.mark.parametrize('name', ['stress_dependence', 'stress_dependent_strain'])
+def test_what_was_left_out_is_found_again(usual, name):
+    known = [effect for effect in usual.effects if effect.id != name]
+    assert name in added(usual, known=known)
+
+
+def test_nothing_is_added_where_nothing_is_missing(usual):
+    assert all(not added(usual, seed=seed) for seed in range(4))
+
+
+def test_two_are_found_one_after_the_other(usual):
+    known = [effect for effect in usual.effects if effect.id != 'stress_dependent_strain']
+    assert set(added(usual, slopes(usual), known)) == {
+        'stress_dependent_strain', 'transformation_slopes'}
+
+
+def test_kinetics_stay_with_what_is_found(usual):
+    kinetics = effect_of(usual, 'kinetics', share=0.8)
+    kinetics.intervals['share'] = 0.7, 0.9
+    found = with_overlooked(
+        fitter_of(usual, made(usual, [kinetics, *slopes(usual)])), [*usual.effects, kinetics],
+        (), PRACTICAL)
+    assert 'transformation_slopes' in {effect.id for effect in found}
+    assert [effect.intervals for effect in found if effect.id == 'kinetics'] == [
+        {'share': (0.7, 0.9)}]
+
+
+def test_it_is_not_added_where_anything_speaks_against_it(usual, monkeypatch):
+    own = slopes(usual)
+    assert 'transformation_slopes' not in added(usual, own, excluded=['transformation_slopes'])
+    # It would have to lower the error of loads held out by all of it.
+    fitter = fitter_of(usual, made(usual, own))
+    known = usual.effects
+    assert with_overlooked(fitter, known, (), 1.0) == known
+    monkeypatch.setattr(bench_overlooked, 'not_determined', lambda *args: 'not at all')
+    assert not added(usual, own)
+
+
+def test_each_effect_tried_has_to_be_worth_more(usual, monkeypatch):
+    """By chance the best of many is better than none."""
+    tried = []
+    monkeypatch.setattr(bench_overlooked, 'schwarz_log_odds',
+                        lambda before, after, rows, more: tried.append(after) or 1.0)
+    assert not added(usual, slopes(usual))
+    assert len(tried) > np.e
