@@ -43,6 +43,7 @@ STRENGTHS = {
     'geometry_error': {'dx': 0.6, 'da': -0.4, 'dz': 0.3},
     'end_stop': {'stop': 1.9, 'side': 1.0, 'stiffness': 5.0},
     'encoder_offset': {'offset': 2.0}, 'encoder_eccentricity': {'e': 3.0, 'phi': 1.0},
+    'encoder_scale': {'k': 1.1, 'theta_0': 70.0},
     'backlash': {'B': 2.0}, 'latency': {'delay': 0.35},
 }
 

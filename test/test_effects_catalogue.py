@@ -79,6 +79,8 @@ EXPECTED = {
     'encoder_offset': ('sensor', 'constant', 'hard stop', {'geometry_error'}),
     'encoder_eccentricity': ('sensor', 'an offset and a scale', 'without its muscles',
                              {'encoder_offset', 'geometry_error'}),
+    'encoder_scale': ('sensor', 'a straight line', 'known angle',
+                      {'encoder_eccentricity', 'encoder_offset', 'geometry_error'}),
     'backlash': ('sensor', 'reversals', 'by hand', {'coulomb_friction'}),
     'latency': ('sensor', 'dtheta/dt', 'chirp', {'thermal_lag'}),
 }
@@ -107,7 +109,7 @@ RANGES = {
     # A clamp of 50 g, too: the base model's own error alone may look like 10 g.
     ('clamp_mass', 'moment'): ('g m', 5.0 * 0.020, 50.0 * 0.050),
     ('geometry_error', 'dx'): ('mm', 0.5, 5.0), ('frame_tilt', 'phi'): ('deg', 1.0, 25.0),
-    ('encoder_eccentricity', 'e'): ('deg', 0.2, 10.0),
+    ('encoder_eccentricity', 'e'): ('deg', 0.2, 10.0), ('encoder_scale', 'k'): ('1', 0.25, 4.0),
     ('encoder_offset', 'offset'): ('deg', 0.2, 15.0), ('backlash', 'B'): ('deg', 0.2, 12.0),
     ('latency', 'delay'): ('s', 0.005, 5.0),
 }

@@ -97,7 +97,8 @@ def test_the_rest_before_a_trial_is_measured_as_what_follows_it(onset):
 
 
 @given(st.lists(st.tuples(st.floats(0.5, 2.5), st.floats(0.01, 1.0)), min_size=1, max_size=20),
-       st.sampled_from(['encoder_offset', 'encoder_eccentricity', 'backlash', 'latency']))
+       st.sampled_from(['encoder_offset', 'encoder_eccentricity', 'encoder_scale', 'backlash',
+                        'latency']))
 def test_row_by_row_is_the_same_as_the_whole_trial(samples, name):
     made = effect(name)
     response, dt = np.array(samples).T

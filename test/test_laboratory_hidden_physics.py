@@ -24,7 +24,7 @@ CATALOGUE = (
     'creep fatigue slack series_compliance unequal_muscles coulomb_friction viscous_friction '
     'inertia payload_error clamp_mass geometry_error frame_tilt end_stop encoder_offset backlash '
     'latency cable_friction encoder_eccentricity measured_supply heat_loss wire_break '
-    'overload formation_memory cold_clamps supply_limit').split()
+    'overload formation_memory cold_clamps supply_limit encoder_scale').split()
 MIDDLE = 4.1
 
 

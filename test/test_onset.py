@@ -89,7 +89,7 @@ def hand_over(arm, other):
     'supply_sag', 'measured_supply', 'pwm_dead_zone', 'airflow', 'ambient_temperature',
     'ambient_drift', 'stress_dependent_strain', 'series_compliance', 'slack', 'unequal_muscles',
     'overload', 'cable_friction', 'frame_tilt', 'payload_error', 'clamp_mass', 'geometry_error',
-    'end_stop', 'encoder_offset', 'encoder_eccentricity'])
+    'end_stop', 'encoder_offset', 'encoder_eccentricity', 'encoder_scale'])
 def test_what_is_remembered_is_handed_over(in_use, begun):
     """By hand, two arms in turn give the same."""
     run, in_use, begun = run_with_onset(), effects_of(in_use), effects_of([begun])

@@ -7,8 +7,8 @@ import inspect
 from importlib import metadata
 
 from hysteresis_ros.effects import (
-    ambient, cable_friction, cold_clamps, creep, electrical, encoder_eccentricity, fatigue,
-    formation_memory, heat_loss, kinetics, material, measured_supply, mechanism, overload,
+    ambient, cable_friction, cold_clamps, creep, electrical, encoder_eccentricity, encoder_scale,
+    fatigue, formation_memory, heat_loss, kinetics, material, measured_supply, mechanism, overload,
     phase_modulus, sensor, thermal, thermal_expansion, transformation_slopes, valve_lag,
     viscoelastic_creep, wire_break)
 from hysteresis_ros.effects.base import Effect, STAGES
@@ -29,7 +29,8 @@ def _own() -> list[type[Effect]]:
     for module in (electrical, measured_supply, thermal, heat_loss, valve_lag, ambient, material,
                    fatigue, creep, viscoelastic_creep, transformation_slopes, phase_modulus,
                    thermal_expansion, formation_memory, kinetics, overload, cold_clamps, mechanism,
-                   cable_friction, wire_break, sensor, encoder_eccentricity):
+                   cable_friction, wire_break, sensor, encoder_eccentricity,
+                   encoder_scale):
         found += [member for member in vars(module).values()
                   if inspect.isclass(member) and issubclass(member, Effect)
                   and member.__module__ == module.__name__ and 'id' in vars(member)]

@@ -270,6 +270,14 @@ def _encoder_eccentricity(conditions: Conditions, size: float, specimen: np.rand
                                   direction=specimen.uniform(-math.pi, math.pi))
 
 
+def _encoder_scale(conditions: Conditions, size: float, specimen: np.random.Generator,
+                   recording: np.random.Generator) -> None:
+    # Set to an angle on one end of the arm's way or beyond it.
+    lowered, raised = (math.radians(angle) for angle in conditions.material.arm_range)
+    end = specimen.choice([lowered, raised, 0.0])
+    conditions.disc = EncoderDisc(pulses=1.0 + 0.2 * size, counted_from=float(end))
+
+
 def _backlash(conditions: Conditions, size: float, specimen: np.random.Generator,
               recording: np.random.Generator) -> None:
     conditions.backlash = math.radians(8.0) * size
@@ -362,7 +370,11 @@ OF_WIRES = {
 }
 
 # What was added after that.
-LATEST = {'supply_limit': Effect('The board limits the current of each wire.', _supply_limit)}
+LATEST = {
+    'supply_limit': Effect('The board limits the current of each wire.', _supply_limit),
+    'encoder_scale': Effect('The encoder has another number of pulses than assumed.',
+                            _encoder_scale, signed=True),
+}
 
 # Here stood a torn wire while no catalogue had it.
 BEFORE = 'unlisted_flexed_lead'
