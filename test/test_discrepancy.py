@@ -23,13 +23,11 @@ def problem():
 
 
 def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
-    """In the angle it is the error of the length times the arm's sensitivity, and the path's."""
+    """In the angle it is the error of the length times the arm's sensitivity."""
     gain = discrepancy.sensitivity(problem, [])
     predicted = problem.simulate([])
-    history = load_history(problem, [])
     found = discrepancy.discrepancy_along(problem, [], predicted, Settings()).matrix(courses=False)
-    assert np.diag(found) == pytest.approx(
-        (0.0004 * gain) ** 2 + history.path ** 2)
+    assert np.diag(found) == pytest.approx((0.0004 * gain) ** 2)
     assert found == pytest.approx(found.T)
     assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
 
@@ -52,7 +50,7 @@ def test_what_martensite_may_keep_of_its_load_is_an_error_of_all_rows_together(n
     assert np.std(all_kept) > 1e-3
     assert found.kept == pytest.approx(all_kept) and found.common.size == 0
     assert found.matrix() - found.matrix(courses=False) == pytest.approx(
-        (np.outer(all_kept, all_kept) + np.outer(found.kinetics, found.kinetics)) / 3.0)
+        sum(np.outer(one, one) for one in (all_kept, found.kinetics, found.path)) / 3.0)
     assert half == pytest.approx(0.5 * all_kept, abs=0.1 * np.abs(all_kept).max())
     known = discrepancy.discrepancy_along(
         problem, [growth], problem.simulate([growth]), Settings(), ['formation_memory'])
@@ -70,18 +68,18 @@ def test_besides_what_has_one_course_the_residual_lacks_a_share_from_none_to_all
     assert np.all(np.std(found.courses, axis=0) > 1e-3)
     other = np.cos(np.arange(len(found.kept)))
     other -= found.courses @ np.linalg.lstsq(found.courses, other, rcond=None)[0]
-    for shares in ((0.4, 0.7), (0.4, 0.0), (0.0, 1.0)):
+    for shares in ((0.4, 0.7, 0.2), (0.4, 0.0, 1.0), (0.0, 1.0, 0.0)):
         residual = found.courses @ shares + other
         assert found.shares(residual) == pytest.approx(shares, abs=1e-9)
         assert found.besides_courses(residual) == pytest.approx(other)
-    alone = dataclasses.replace(found, kinetics=0.0 * found.kinetics)
+    alone = dataclasses.replace(found, kinetics=0.0 * found.kinetics, path=0.0 * found.path)
     other -= (found.kept @ other) / (found.kept @ found.kept) * found.kept
     for share, left in ((0.4, 0.0), (1.5, 0.5), (-0.5, -0.5)):
         residual = share * found.kept + other
         assert alone.besides_courses(residual) == pytest.approx(left * found.kept + other)
     nothing = dataclasses.replace(alone, kept=0.0 * found.kept)
     assert nothing.besides_courses(other) == pytest.approx(other)
-    assert nothing.shares(other).tolist() == [0.0, 0.0]
+    assert nothing.shares(other).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_a_muscle_without_martensite_keeps_nothing(monkeypatch):
@@ -102,12 +100,19 @@ def test_what_may_be_kept_is_no_discrepancy_where_it_is_an_effect(fitted):
     if fitted:
         effects.append(effect_of(model, 'formation_memory', kept=0.4))
     problem = problem_for(model.with_effects(effects), [runs(model)])
-    gain, history = discrepancy.sensitivity(problem, effects), load_history(problem, effects)
+    gain = discrepancy.sensitivity(problem, effects)
     found = discrepancy.discrepancy_along(
         problem, effects, problem.simulate(effects), Settings(),
         () if fitted else ('slack', 'formation_memory'))
-    assert np.diag(found.matrix(courses=False)) == pytest.approx(
-        (0.0004 * gain) ** 2 + history.path ** 2)
+    assert np.diag(found.matrix(courses=False)) == pytest.approx((0.0004 * gain) ** 2)
+    assert not np.any(found.kept)
+
+
+def test_a_load_that_leaves_no_mark_is_an_error_of_all_rows_together(problem):
+    found = discrepancy.discrepancy_along(problem, [], problem.simulate([]), Settings())
+    path = load_history(problem, []).path
+    assert np.std(path) > 1e-4 and found.path == pytest.approx(path)
+    assert found.besides_courses(0.6 * path) == pytest.approx(0.0 * path, abs=1e-9)
 
 
 def test_errors_of_rows_that_are_near_on_the_way_and_in_response_are_alike(problem):
@@ -197,13 +202,12 @@ def test_the_discrepancy_follows_the_load(problem):
         (0.5 * middle, middle, 2.0 * middle), left_out=[9e-4, 1e-4, 1e-4],
         identification=[9e-4, 1e-5, 1e-4]))
     problem = problem_for(model, [runs(model)])
-    gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
+    gain = discrepancy.sensitivity(problem, [])
     found = np.diag(discrepancy.discrepancy_along(
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
     error = discrepancy.length_errors(model, load)
     assert np.ptp(error) > 1e-5
-    assert found == pytest.approx(
-        (error * gain) ** 2 + history.path ** 2)
+    assert found == pytest.approx((error * gain) ** 2)
 
 
 def with_relative(**parts):
@@ -236,7 +240,7 @@ def test_the_discrepancy_is_larger_where_the_muscle_transforms(problem):
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
     relative = discrepancy.relative_errors(model, history.martensite)
     assert relative.max() - relative.min() > 0.5
-    assert found == pytest.approx((4e-4 * gain * relative) ** 2 + history.path ** 2)
+    assert found == pytest.approx((4e-4 * gain * relative) ** 2)
 
 
 def test_an_error_of_the_thresholds_shows_where_the_response_follows_the_drive():
@@ -266,7 +270,7 @@ def test_an_error_of_the_thresholds_shows_where_the_response_follows_the_drive()
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
     own = gain * discrepancy.relative_errors(model, history.martensite)
     thresholds = along * discrepancy.drive_error(model)
-    assert found == pytest.approx(4e-4 ** 2 * (own ** 2 + thresholds ** 2) + history.path ** 2)
+    assert found == pytest.approx(4e-4 ** 2 * (own ** 2 + thresholds ** 2))
 
 
 def test_martensite_along_the_way_is_that_of_the_second_stage(problem):

@@ -17,8 +17,8 @@ It is known before the arm moves. With effects, their equations may be off as we
 * The bench holds the load still, while an arm's load moves with the wire: what a load does in the
   middle of a transformation the bench cannot tell. Models that agree on every bench table bound
   that. One of them feels the present load alone (`load_history`). In another one martensite keeps
-  the strain of the load under which it formed: a share that is the same for the whole wire, so that
-  all rows err together; but where that effect is tried, it speaks for itself.
+  the strain of the load under which it formed. By what share each is right is the same for the
+  whole wire, so that all rows err together; but where that effect is tried, it speaks for itself.
 * A bench goes through few minor loops, which weights can follow whatever their kind. In one more
   model that agrees with it, what transforms is in proportion to what has still to (`kinetics`); by
   what share it is right is the same for all rows, too.
@@ -90,6 +90,8 @@ class Discrepancy:
         none to all, is an error of all rows together.
     kinetics : ndarray, shape (n,)
         The same if all of it followed the kinetics of `Kinetics`.
+    path : ndarray, shape (n,)
+        The same if the present load had acted all along (`LoadHistory.path`).
     equations : ndarray, shape (n, e)
         The same as `parts`, for the equations of effects.
     """
@@ -99,12 +101,13 @@ class Discrepancy:
     common: np.ndarray
     kept: np.ndarray
     kinetics: np.ndarray
+    path: np.ndarray
     equations: np.ndarray
 
     @property
     def courses(self) -> np.ndarray:
-        """What has one course, and a share that is not known: `kept` and `kinetics`, (n, 2)."""
-        return np.column_stack([self.kept, self.kinetics])
+        """What has one course, and a share that is not known: (n, 3)."""
+        return np.column_stack([self.kept, self.kinetics, self.path])
 
     @property
     def size(self) -> float:
@@ -119,7 +122,7 @@ class Discrepancy:
                                      + np.sum(self.common ** 2, axis=1))))
 
     def shares(self, residual: np.ndarray) -> np.ndarray:
-        """Return the shares (2,) of the `courses`, 0 to 1, that explain most of a residual (n,)."""
+        """Return the shares (3,) of the `courses`, 0 to 1, that explain most of a residual (n,)."""
         from scipy.optimize import lsq_linear       # a third of a second that a bench does not need
         found, acting = np.zeros(self.courses.shape[1]), np.any(self.courses, axis=0)
         if np.any(acting):
@@ -338,7 +341,7 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     if thresholds:
         bench = np.hypot(bench, length * thresholds * drive_sensitivity(problem, effects))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
-    parts = np.column_stack([bench, DIRECTIONAL * direction * bench, history.path])
+    parts = np.column_stack([bench, DIRECTIONAL * direction * bench])
     common = left_out_changes(problem, effects)
     if room:
         common = np.column_stack([common, room_change(problem, effects)])
@@ -350,7 +353,7 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     return Discrepancy(
         parts, np.column_stack([way_done(drive, predicted, problem.trial), unit(predicted)])
         / settings.correlation, common,
-        kept, kinetics, np.zeros((len(predicted), 0)))
+        kept, kinetics, history.path, np.zeros((len(predicted), 0)))
 
 
 def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
