@@ -8,7 +8,8 @@ import pytest
 from test_bench_expansion import NOISE, PRACTICAL
 from test_bench_kinetics import fitter_of, LOADS, USUAL
 
-from hysteresis_ros.diagnosis import bench_overlooked
+from hysteresis_ros.diagnosis import bench_overlooked, extend
+from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_overlooked import with_overlooked
 from hysteresis_ros.identification.bench import identify
@@ -91,8 +92,39 @@ def test_it_is_not_added_where_anything_speaks_against_it(usual, monkeypatch):
     fitter = fitter_of(usual, made(usual, own))
     known = usual.effects
     assert with_overlooked(fitter, known, (), 1.0) == known
-    monkeypatch.setattr(bench_overlooked, 'not_determined', lambda *args: 'not at all')
+    with monkeypatch.context() as patch:
+        patch.setattr(bench_overlooked, 'not_determined', lambda *args: 'not at all')
+        assert not added(usual, own)
+    monkeypatch.setattr(Fit, 'implausible', lambda self: ['transformation_slopes.g'])
     assert not added(usual, own)
+
+
+def test_what_rows_do_not_determine_stays_as_loads_left_out_have_it(usual, monkeypatch):
+    monkeypatch.setattr(bench_overlooked, 'not_determined', lambda effect, kind: (
+        'not by these rows' if effect.id == 'stress_dependent_strain' else None))
+    found = with_overlooked(
+        fitter_of(usual, made(usual, slopes(usual))), usual.effects, (), PRACTICAL)
+    kept, = (effect for effect in usual.effects if effect.id == 'stress_dependent_strain')
+    assert {effect.id for effect in found} > {effect.id for effect in usual.effects}
+    assert any(effect is kept for effect in found)
+
+
+@pytest.mark.parametrize('known_before', [True, False])
+def test_a_form_that_rows_do_not_determine_takes_no_place_of_one_that_they_do(
+        usual, known_before, monkeypatch):
+    growth = effect_of(usual, 'stress_dependent_strain', r=0.5, F0=0.6)
+    growth.intervals['r'] = (0.4, 0.6) if known_before else (0.0, 1.0)
+    kinetics = effect_of(usual, 'kinetics', share=0.8)
+    kinetics.intervals['share'] = 0.7, 0.9
+    other = growth.with_values(n=4.0)
+    other.intervals['r'] = 0.0, 1.0
+    fixed = []
+    monkeypatch.setattr(extend, 'with_best_forms', lambda fitter, effects, names: (
+        fixed.append(set(names)) or [other, kinetics]))
+    extend.extended_model(
+        usual.with_effects([]), ['stress_dependent_strain', 'kinetics'], [made(usual)],
+        [growth, kinetics])
+    assert fixed == [{'kinetics'}, *[{'kinetics', 'stress_dependent_strain'}] * known_before]
 
 
 def test_each_effect_tried_has_to_be_worth_more(usual, monkeypatch):
