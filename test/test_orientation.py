@@ -198,21 +198,30 @@ def test_observer_and_simulation_of_an_arm_agree(names, dt):
     assert np.abs(plain - seen).max() > np.radians(0.3)
 
 
-def test_the_arm_is_balanced_under_the_load_that_has_oriented():
-    """Angle, output and load fit together: L = L0 + S(F) y, y under the g of that load."""
+@pytest.mark.parametrize('g', [-1.2, -0.9, 0.0, 0.6])
+def test_the_arm_is_balanced_under_the_load_that_has_oriented(g):
+    """
+    Angle, output and load fit together: L = L0 + S(F) y, y under the g of that load.
+
+    Also where the loop's width falls as fast as the load grows, so that load and play are found
+    together or not at all.
+    """
     model = orienting(growth=ON_ARM)
+    model = model.with_effects([
+        *model.effects, *([effect_of(model, 'transformation_slopes', g=g)] if g else [])])
     voltage = wandering_voltage(600, seed=5)[::10]
     inputs = []
     simulator = Simulator(model, arm_run(voltage))
     angles = simulator.run(model.effects, inputs)
     chain, geometry = model.chain(), model.require_geometry()
     load = geometry.force(angles)
+    assert np.ptp(angles) > np.radians(10.0)
     stage = model.require_length_stage(chain)
     cold = model.predict(arm_run(np.zeros(1)))
     first = geometry.force(cold)
     stage.orient(float(chain.oriented(first)[0]))
     x = model.first_stage(chain)
-    stage.step(float(first[0] - x.simulate(np.zeros(1))[0]))
+    stage.step(float(first[0] - chain.loop_width(first)[0] - x.simulate(np.zeros(1))[0]))
     outputs = stage.simulate_under(inputs[0], chain.oriented(load))
     base = stage.output_range[0]
     assert geometry.length(angles) == pytest.approx(

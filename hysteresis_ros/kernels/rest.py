@@ -18,9 +18,9 @@ from .formation import keep, LOAD as BEYOND, parts
 from .lean import inlined, lean
 from .operator import last_input, last_output, peek, solve, step
 
-# The loop's width changes by less than a third of a change of the load: each pass leaves less than
-# a third of the one before.
-WIDTH_PASSES = 8
+# Secants of the load whose play is taken up: the loop's width is nearly a line of the load. Putting
+# it in anew ends nowhere where the width falls as fast as the load grows.
+SECANTS = 12
 
 
 @inlined
@@ -32,7 +32,10 @@ def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: f
     here, play = _lacking(arm, state, line, u, x, offset, factor, 0.0), 0.0
     if arm.plays and here > 0.0:
         # On the way to the cold the play is taken up first.
-        here, play = max(_lacking(arm, state, line, u, x, offset, factor, 1.0), 0.0), 1.0
+        whole = _lacking(arm, state, line, u, x, offset, factor, 1.0)
+        if whole < 0.0:
+            _take_up(arm, state, line, u, x, offset, factor, here, whole)
+        here, play = max(whole, 0.0), 1.0
     if abs(here) > arm.tolerance:
         u = root.begin(motion, REST_SEARCH, u, here, here * motion[REST_GAIN], -np.inf, np.inf,
                        arm.tolerance)
@@ -47,6 +50,18 @@ def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: f
     if arm.wires.kept != 0.0:
         keep(state.muscles, 0, output, factor_at(arm, line, k, share))
     return k, share
+
+
+@inlined
+def _take_up(arm: Arm, state: State, line: int, u: float, x: float, offset: float, factor: float,
+             here: float, whole: float) -> None:
+    """Let a load that takes up a part of the play orient its share, while H2's input stays."""
+    if arm.wires.orients:
+        part = root.between(state.motion, REST_SEARCH, 0.0, here, 1.0, whole, arm.tolerance)
+        while root.searching(state.motion, REST_SEARCH):
+            part = root.proceed(state.motion, REST_SEARCH, _lacking(
+                arm, state, line, u, x, offset, factor, part))
+        _orient(arm, state, u, x, part)
 
 
 @inlined
@@ -76,11 +91,27 @@ def _lacking(arm: Arm, state: State, line: int, u: float, x: float, offset: floa
 def _orient(arm: Arm, state: State, u: float, x: float, play: float) -> None:
     """Let the load under which H2 has an input orient its share; see `_lacking`."""
     load = u + x
-    if arm.plays and arm.wires.orients:
-        # The load F = u + x + w(F) of a muscle whose play is taken up.
-        for _ in range(WIDTH_PASSES):
-            load = u + x + play * bundle.width_at(arm.wires, load)
+    if play > 0.0 and arm.wires.orients:
+        load = _with_play(arm, load, play)
     bundle.orient_under(arm.wires, state.memories[0], state.muscles, 0, load)
+
+
+@inlined
+def _with_play(arm: Arm, without: float, play: float) -> float:
+    """Return the load F for what is left of it without a share of the play, F - play w(F)."""
+    before = load = without
+    wrong = missing = play * bundle.width_at(arm.wires, load)
+    for _ in range(SECANTS):
+        if abs(missing) <= arm.tolerance:
+            break
+        # The first step is the one that a width of its own would take.
+        step = missing if load == before else missing * (load - before) / (wrong - missing)
+        before, wrong = load, missing
+        load += step
+        missing = without + play * bundle.width_at(arm.wires, load) - load
+        if missing == wrong:
+            break
+    return load
 
 
 @inlined
