@@ -24,10 +24,10 @@ def problem():
 
 def test_the_discrepancy_has_the_size_that_the_bench_found(problem):
     """In the angle it is the error of the length times the arm's sensitivity."""
-    gain = discrepancy.sensitivity(problem, [])
+    gain, path = discrepancy.sensitivity(problem, []), load_history(problem, []).path
     predicted = problem.simulate([])
     found = discrepancy.discrepancy_along(problem, [], predicted, Settings()).matrix(courses=False)
-    assert np.diag(found) == pytest.approx((0.0004 * gain) ** 2)
+    assert np.diag(found) == pytest.approx((0.0004 * gain) ** 2 + path ** 2 / 12.0)
     assert found == pytest.approx(found.T)
     assert np.linalg.eigvalsh(found).min() > -1e-9 * np.max(found)
 
@@ -100,11 +100,12 @@ def test_what_may_be_kept_is_no_discrepancy_where_it_is_an_effect(fitted):
     if fitted:
         effects.append(effect_of(model, 'formation_memory', kept=0.4))
     problem = problem_for(model.with_effects(effects), [runs(model)])
-    gain = discrepancy.sensitivity(problem, effects)
+    gain, path = discrepancy.sensitivity(problem, effects), load_history(problem, effects).path
     found = discrepancy.discrepancy_along(
         problem, effects, problem.simulate(effects), Settings(),
         () if fitted else ('slack', 'formation_memory'))
-    assert np.diag(found.matrix(courses=False)) == pytest.approx((0.0004 * gain) ** 2)
+    assert np.diag(found.matrix(courses=False)) == pytest.approx(
+        (0.0004 * gain) ** 2 + path ** 2 / 12.0)
     assert not np.any(found.kept)
 
 
@@ -202,12 +203,12 @@ def test_the_discrepancy_follows_the_load(problem):
         (0.5 * middle, middle, 2.0 * middle), left_out=[9e-4, 1e-4, 1e-4],
         identification=[9e-4, 1e-5, 1e-4]))
     problem = problem_for(model, [runs(model)])
-    gain = discrepancy.sensitivity(problem, [])
+    gain, path = discrepancy.sensitivity(problem, []), load_history(problem, []).path
     found = np.diag(discrepancy.discrepancy_along(
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
     error = discrepancy.length_errors(model, load)
     assert np.ptp(error) > 1e-5
-    assert found == pytest.approx((error * gain) ** 2)
+    assert found == pytest.approx((error * gain) ** 2 + path ** 2 / 12.0)
 
 
 def with_relative(**parts):
@@ -240,7 +241,7 @@ def test_the_discrepancy_is_larger_where_the_muscle_transforms(problem):
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
     relative = discrepancy.relative_errors(model, history.martensite)
     assert relative.max() - relative.min() > 0.5
-    assert found == pytest.approx((4e-4 * gain * relative) ** 2)
+    assert found == pytest.approx((4e-4 * gain * relative) ** 2 + history.path ** 2 / 12.0)
 
 
 def test_an_error_of_the_thresholds_shows_where_the_response_follows_the_drive():
@@ -270,7 +271,8 @@ def test_an_error_of_the_thresholds_shows_where_the_response_follows_the_drive()
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
     own = gain * discrepancy.relative_errors(model, history.martensite)
     thresholds = along * discrepancy.drive_error(model)
-    assert found == pytest.approx(4e-4 ** 2 * (own ** 2 + thresholds ** 2))
+    assert found == pytest.approx(
+        4e-4 ** 2 * (own ** 2 + thresholds ** 2) + history.path ** 2 / 12.0)
 
 
 def test_martensite_along_the_way_is_that_of_the_second_stage(problem):

@@ -16,9 +16,10 @@ It is known before the arm moves. With effects, their equations may be off as we
   (`model.replicates`; Efron, The Jackknife, the Bootstrap and Other Resampling Plans, 1982).
 * The bench holds the load still, while an arm's load moves with the wire: what a load does in the
   middle of a transformation the bench cannot tell. Models that agree on every bench table bound
-  that. One of them feels the present load alone (`load_history`). In another one martensite keeps
-  the strain of the load under which it formed. By what share each is right is the same for the
-  whole wire, so that all rows err together; but where that effect is tried, it speaks for itself.
+  that. One of them feels the present load alone (`load_history`), in another one martensite keeps
+  the strain of the load under which it formed. By what share each is right is about the same for
+  the whole wire, so that all rows err together; of the load's own mark it may differ from place to
+  place. Where martensite's memory is tried, it speaks for itself.
 * A bench goes through few minor loops, which weights can follow whatever their kind. In one more
   model that agrees with it, what transforms is in proportion to what has still to (`kinetics`); by
   what share it is right is the same for all rows, too.
@@ -55,8 +56,9 @@ if TYPE_CHECKING:
 
 # The error that differs between the directions of the drive, against the common one.
 DIRECTIONAL = 0.5
-# A share of which nothing is known, root mean square: from none to all, each as likely.
-SHARE = 1.0 / math.sqrt(3.0)
+# A share of which nothing is known, root mean square: from none to all, each as likely; and what of
+# it may differ from place to place, its standard deviation.
+SHARE, SHARE_SPREAD = 1.0 / math.sqrt(3.0), 1.0 / math.sqrt(12.0)
 # Effects of which no bench tells the share, as `Discrepancy.courses` has them.
 COURSES: tuple[type[Effect], ...] = (FormationMemory, Kinetics)
 # By how much the full drive heats a muscle above the room [K], about.
@@ -341,7 +343,8 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     if thresholds:
         bench = np.hypot(bench, length * thresholds * drive_sensitivity(problem, effects))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
-    parts = np.column_stack([bench, DIRECTIONAL * direction * bench])
+    parts = np.column_stack([bench, DIRECTIONAL * direction * bench,
+                             SHARE_SPREAD * history.path])
     common = left_out_changes(problem, effects)
     if room:
         common = np.column_stack([common, room_change(problem, effects)])
