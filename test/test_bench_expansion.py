@@ -25,8 +25,7 @@ TRIALS = {'length_trials': range(4), 'force_trials': [0]}
 NOISE, PRACTICAL = 2e-5, 0.05
 
 
-@pytest.fixture(scope='module')
-def usual():
+def usual_model():
     """Return a model of a wire that does not expand, with what every loaded muscle has."""
     force, length = (Measurement.from_columns(bench_tables({}, 11)[name])
                      for name in ('force.csv', 'length.csv'))
@@ -34,16 +33,27 @@ def usual():
     return add_effects(plain, length, force, USUAL, **TRIALS)[0]
 
 
-def made(model, alpha, seed=0):
-    """Return lengths of that wire where it expands, on the bench of the paper."""
+@pytest.fixture(scope='module')
+def usual():
+    """Return that model."""
+    return usual_model()
+
+
+def made_with(model, own=(), seed=0):
+    """Return lengths of that wire with effects of its own, on the bench of the paper."""
     drive = damped_oscillation()
     columns = {'trial': np.repeat(np.arange(float(len(LOADS))), len(drive)),
                'voltage': np.tile(drive, len(LOADS)), 'force': np.repeat(LOADS, len(drive))}
     clean = Measurement.from_columns({**columns, 'length': np.zeros(len(drive) * len(LOADS))})
-    own = [effect_of(model, 'thermal_expansion', alpha=alpha)] if alpha else []
     lengths = model.with_effects([*model.effects, *own]).predict(clean)
     return with_noise(Measurement.from_columns({**columns, 'length': lengths}),
                       NOISE * np.random.default_rng(seed).standard_normal(len(lengths)))
+
+
+def made(model, alpha, seed=0):
+    """Return lengths of that wire where it expands."""
+    return made_with(
+        model, [effect_of(model, 'thermal_expansion', alpha=alpha)] if alpha else [], seed)
 
 
 def shown(usual, alpha, seed=0, **changes):

@@ -2,47 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a set of effects of a bench lacks, by rows and loads that are left out."""
 
-from model_support import effect_of, with_noise
+from model_support import effect_of
 import numpy as np
 import pytest
-from test_bench_expansion import NOISE, PRACTICAL
-from test_bench_kinetics import fitter_of, LOADS, USUAL
+from test_bench_expansion import made_with, PRACTICAL, usual_model
+from test_bench_kinetics import fitter_of
 
 from hysteresis_ros.diagnosis import bench_overlooked, extend
 from hysteresis_ros.diagnosis.arm_fit import Fit
-from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_overlooked import with_overlooked
-from hysteresis_ros.identification.bench import identify
-from hysteresis_ros.laboratory.experiments import bench_tables
-from hysteresis_ros.laboratory.sequences import damped_oscillation
-from hysteresis_ros.measurements import Measurement
-
-TRIALS = {'length_trials': range(4), 'force_trials': [0]}
 
 
 @pytest.fixture(scope='module')
 def usual():
     """Return a model of a wire with what every loaded muscle has."""
-    force, length = (Measurement.from_columns(bench_tables({}, 11)[name])
-                     for name in ('force.csv', 'length.csv'))
-    plain = identify(length, force, **TRIALS).model
-    return add_effects(plain, length, force, USUAL, **TRIALS)[0]
-
-
-def made(model, own=(), seed=0):
-    """Return lengths of that wire with effects of its own, on the bench of the paper."""
-    drive = damped_oscillation()
-    columns = {'trial': np.repeat(np.arange(float(len(LOADS))), len(drive)),
-               'voltage': np.tile(drive, len(LOADS)), 'force': np.repeat(LOADS, len(drive))}
-    clean = Measurement.from_columns({**columns, 'length': np.zeros(len(drive) * len(LOADS))})
-    lengths = model.with_effects([*model.effects, *own]).predict(clean)
-    return with_noise(Measurement.from_columns({**columns, 'length': lengths}),
-                      NOISE * np.random.default_rng(seed).standard_normal(len(lengths)))
+    return usual_model()
 
 
 def added(usual, own=(), known=None, excluded=(), seed=0):
     known = usual.effects if known is None else known
-    found = with_overlooked(fitter_of(usual, made(usual, own, seed)), known, excluded, PRACTICAL)
+    found = with_overlooked(
+        fitter_of(usual, made_with(usual, own, seed)), known, excluded, PRACTICAL)
     return {effect.id: effect for effect in found
             if effect.id not in {one.id for one in known}}
 
@@ -78,7 +58,7 @@ def test_kinetics_stay_with_what_is_found(usual):
     kinetics = effect_of(usual, 'kinetics', share=0.8)
     kinetics.intervals['share'] = 0.7, 0.9
     found = with_overlooked(
-        fitter_of(usual, made(usual, [kinetics, *slopes(usual)])), [*usual.effects, kinetics],
+        fitter_of(usual, made_with(usual, [kinetics, *slopes(usual)])), [*usual.effects, kinetics],
         (), PRACTICAL)
     assert 'transformation_slopes' in {effect.id for effect in found}
     assert [effect.intervals for effect in found if effect.id == 'kinetics'] == [
@@ -89,7 +69,7 @@ def test_it_is_not_added_where_anything_speaks_against_it(usual, monkeypatch):
     own = slopes(usual)
     assert 'transformation_slopes' not in added(usual, own, excluded=['transformation_slopes'])
     # It would have to lower the error of loads held out by all of it.
-    fitter = fitter_of(usual, made(usual, own))
+    fitter = fitter_of(usual, made_with(usual, own))
     known = usual.effects
     assert with_overlooked(fitter, known, (), 1.0) == known
     with monkeypatch.context() as patch:
@@ -103,7 +83,7 @@ def test_what_rows_do_not_determine_stays_as_loads_left_out_have_it(usual, monke
     monkeypatch.setattr(bench_overlooked, 'not_determined', lambda effect, kind: (
         'not by these rows' if effect.id == 'stress_dependent_strain' else None))
     found = with_overlooked(
-        fitter_of(usual, made(usual, slopes(usual))), usual.effects, (), PRACTICAL)
+        fitter_of(usual, made_with(usual, slopes(usual))), usual.effects, (), PRACTICAL)
     kept, = (effect for effect in usual.effects if effect.id == 'stress_dependent_strain')
     assert {effect.id for effect in found} > {effect.id for effect in usual.effects}
     assert any(effect is kept for effect in found)
@@ -122,7 +102,7 @@ def test_a_form_that_rows_do_not_determine_takes_no_place_of_one_that_they_do(
     monkeypatch.setattr(extend, 'with_best_forms', lambda fitter, effects, names: (
         fixed.append(set(names)) or [other, kinetics]))
     extend.extended_model(
-        usual.with_effects([]), ['stress_dependent_strain', 'kinetics'], [made(usual)],
+        usual.with_effects([]), ['stress_dependent_strain', 'kinetics'], [made_with(usual)],
         [growth, kinetics])
     assert fixed == [{'kinetics'}, *[{'kinetics', 'stress_dependent_strain'}] * known_before]
 
