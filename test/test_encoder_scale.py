@@ -32,6 +32,14 @@ def test_the_laboratorys_counts_are_that_line():
     assert disc.reading(0.7) == pytest.approx(0.7)
 
 
+def test_an_eccentric_disc_that_does_as_well_comes_first():
+    model = bicep_model()
+    disc = effect_of(model, 'encoder_eccentricity', e=5.0, phi=0.3)
+    found = diagnose(model, [runs(model.with_effects([disc]), trials=4, rows=30, seed=4)],
+                     ['encoder_scale', 'encoder_eccentricity', 'payload_error', 'backlash'])
+    assert found.missing == ['encoder_eccentricity']
+
+
 @pytest.mark.parametrize('k, theta_0', [(0.8, 140.0), (1.25, 60.0), (2.0, 90.0)])
 def test_it_is_named_with_its_size(k, theta_0):
     model = bicep_model()
