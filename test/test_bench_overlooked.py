@@ -111,6 +111,8 @@ def test_each_effect_tried_has_to_be_worth_more(usual, monkeypatch):
     """By chance the best of many is better than none."""
     tried = []
     monkeypatch.setattr(bench_overlooked, 'schwarz_log_odds',
-                        lambda before, after, rows, more: tried.append(after) or 1.0)
+                        lambda before, after, rows, more: tried.append(more) or 1.0)
     assert not added(usual, slopes(usual))
     assert len(tried) > np.e
+    # Each by the parameters that it has: one of slopes, three of an R-phase.
+    assert min(tried) == 1 and max(tried) >= 2

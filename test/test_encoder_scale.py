@@ -38,6 +38,7 @@ def test_an_eccentric_disc_that_does_as_well_comes_first():
     found = diagnose(model, [runs(model.with_effects([disc]), trials=4, rows=30, seed=4)],
                      ['encoder_scale', 'encoder_eccentricity', 'payload_error', 'backlash'])
     assert found.missing == ['encoder_eccentricity']
+    assert 0.0 < effect_of(model, 'encoder_scale').prior_odds < disc.prior_odds == 1.0
 
 
 @pytest.mark.parametrize('k, theta_0', [(0.8, 140.0), (1.25, 60.0), (2.0, 90.0)])

@@ -81,8 +81,8 @@ class _OneMore:
         fitted = self._fitter.with_intervals(self._fitter.fit(others))
         # What loads held out have determined is not refitted to rows that do not determine it.
         vague = {effect.id for effect in fitted if not_determined(effect, problem.kind)}
-        self._kept = [*(effect for effect in others if effect.id in vague), *kinetics]
-        self._fitter.fixed = [*fitter.fixed, *self._kept]
+        self._fixed = [*(effect for effect in others if effect.id in vague), *kinetics]
+        self._fitter.fixed = [*fitter.fixed, *self._fixed]
         self._base = self._fitter.fit([effect for effect in fitted if effect.id not in vague])
         self._rows = independent_rows(
             problem.measured - self._base.predicted, problem.trial,
@@ -101,7 +101,7 @@ class _OneMore:
                 effects = self._fitter.with_intervals(fit)
                 if (not any(not_determined(effect, self._fitter.problem.kind)
                             for effect in effects) and self._confirmed(fit, practical)):
-                    return [*self._kept, *effects]
+                    return [*self._fixed, *effects]
         return None
 
     def _with(self, name: str) -> Fit:
