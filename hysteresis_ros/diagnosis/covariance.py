@@ -99,6 +99,12 @@ def noise_of(values: np.ndarray) -> float:
     return float(np.exp(values[3]))
 
 
+def _equal_square(whitened: np.ndarray) -> np.ndarray:
+    """Return the square of equal rows that are as probable by Student's t as rows (n,) or (n, k)."""
+    square: np.ndarray = TAILS * np.expm1(np.mean(np.log1p(whitened ** 2 / TAILS), axis=0))
+    return square
+
+
 class Covariance:
     """
     Covariances of residuals on the rows of one problem.
@@ -261,6 +267,43 @@ class Covariance:
         scale = np.exp(self._spread * rng.standard_normal(count))
         errors = scale * np.sqrt(np.mean(draws ** 2, axis=0))
         return float(np.hypot(np.quantile(errors, level), self.resolution))
+
+    def relative_size(self, residual: np.ndarray, noise: float, rng: np.random.Generator,
+                      count: int, level: float) -> float:
+        """
+        Return the size of a residual over that which the discrepancy stays below, at a probability.
+
+        Each row counts by the variance that it may have, as an error that is small where the arm
+        moves far is large where it rests: that of discrepancy, noise, and once more what the base
+        model is off by on average, whose size is known better than its place. Sizes are those of
+        equal rows as probable by Student's t, so that single rows do not decide.
+
+        Parameters
+        ----------
+        residual : ndarray, shape (n,)
+            Measured less simulated.
+        noise : float
+            Standard deviation of the white noise in it, which does not count.
+        rng : numpy.random.Generator
+        count : int
+            Number of draws.
+        level : float
+            The probability.
+        """
+        matrix = self.discrepancy.matrix(courses=False)
+        noise = max(noise, self.resolution)
+        deviation = np.sqrt(np.diag(matrix) + noise ** 2
+                            + self.discrepancy.size_besides_courses ** 2)
+        values, vectors = linalg.eigh(matrix)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        scale = np.exp(self._spread * rng.standard_normal(count))
+        draws = scale * (root @ rng.standard_normal((len(values), count)))
+        white = noise * rng.standard_normal(draws.shape)
+        own = self.discrepancy.besides_courses(residual, deviation)
+        of_noise = np.median(_equal_square(white / deviation[:, None]))
+        largest = np.quantile(_equal_square((draws + white) / deviation[:, None]), level)
+        beyond = float(_equal_square(own / deviation) - of_noise)
+        return math.sqrt(max(beyond, 0.0) / max(float(largest - of_noise), _TINY))
 
     def fit(self, residual: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
         """

@@ -123,18 +123,24 @@ class Discrepancy:
         return float(np.sqrt(np.mean(np.sum(self.parts ** 2, axis=1)
                                      + np.sum(self.common ** 2, axis=1))))
 
-    def shares(self, residual: np.ndarray) -> np.ndarray:
-        """Return the shares (3,) of the `courses`, 0 to 1, that explain most of a residual (n,)."""
+    def shares(self, residual: np.ndarray, deviation: np.ndarray | float = 1.0) -> np.ndarray:
+        """
+        Return the shares (3,) of the `courses`, 0 to 1, that explain most of a residual (n,).
+
+        In units of a standard deviation (n,) of each row, where it is given.
+        """
         from scipy.optimize import lsq_linear       # a third of a second that a bench does not need
         found, acting = np.zeros(self.courses.shape[1]), np.any(self.courses, axis=0)
         if np.any(acting):
             found[acting] = lsq_linear(
-                self.courses[:, acting], residual, (0.0, 1.0), method='bvls').x
+                self.courses[:, acting] / np.reshape(deviation, (-1, 1)), residual / deviation,
+                (0.0, 1.0), method='bvls').x
         return found
 
-    def besides_courses(self, residual: np.ndarray) -> np.ndarray:
-        """Return a residual (n,) without the shares of the `courses` that explain most of it."""
-        return residual - self.courses @ self.shares(residual)
+    def besides_courses(self, residual: np.ndarray, deviation: np.ndarray | float = 1.0
+                        ) -> np.ndarray:
+        """Return a residual (n,) without the `shares` of the `courses` that explain most of it."""
+        return residual - self.courses @ self.shares(residual, deviation)
 
     def of_model_alone(self) -> Discrepancy:
         """Return the base model's own error, as if all equations of effects were exact."""
@@ -344,7 +350,7 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
         bench = np.hypot(bench, length * thresholds * drive_sensitivity(problem, effects))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
     parts = np.column_stack([bench, DIRECTIONAL * direction * bench,
-                             SHARE_SPREAD * history.path])
+                             SHARE_SPREAD * history.path, kinetics_spread(problem, effects)])
     common = left_out_changes(problem, effects)
     if room:
         common = np.column_stack([common, room_change(problem, effects)])
@@ -377,6 +383,34 @@ def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect]
     """
     size = kind.parameters[0]
     return _change_by(kind(problem.model.surroundings, **{size.name: 1.0}), problem, effects)
+
+
+def kinetics_spread(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+    """
+    Return how much the response may be off where part of the wire follows its kinetics.
+
+    Of a share s that does, each place may be one that does or one that does not, with a variance of
+    s (1 - s) about their mean. A wire all of which does has no such places.
+
+    Parameters
+    ----------
+    problem : ArmProblem
+        Rows and model.
+    effects : sequence of Effect
+        All effects of the model.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Standard deviation times the change by all of the kinetics; 0 without kinetics.
+    """
+    own = next((effect for effect in effects if isinstance(effect, Kinetics)), None)
+    if own is None or not 0.0 < own.share < 1.0:
+        return np.zeros(len(problem.measured))
+    others = [effect for effect in effects if effect is not own]
+    without, whole = problem.simulate_many([others, [*others, own.with_values(share=1.0)]])
+    spread: np.ndarray = math.sqrt(own.share * (1.0 - own.share)) * (whole - without)
+    return spread
 
 
 def _change_by(effect: Effect, problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

@@ -79,6 +79,7 @@ class FittedSets:
         self._least: dict[frozenset[str], np.ndarray] = {}
         # Each with the response that it belongs to.
         self._errors: dict[frozenset[str], tuple[np.ndarray, float, float]] = {}
+        self._sizes: dict[frozenset[str], tuple[np.ndarray, float, float]] = {}
         self._largest_noises: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self._predicts: dict[frozenset[str], tuple[np.ndarray, bool]] = {}
@@ -114,6 +115,7 @@ class FittedSets:
         """Keep the response (n,) of a set that was fitted by least squares."""
         self._least[names] = predicted
         self._errors.pop(names, None)
+        self._sizes.pop(names, None)
 
     def log_posterior(self, names: frozenset[str]) -> float:
         """
@@ -169,27 +171,41 @@ class FittedSets:
         fit = self.fits[names]
         known = self._errors.get(names)
         if known is None or known[0] is not fit.predicted:
-            least = self._least[names] if names in self._least else self.fitter.towards_least(fit)
-            residuals = [self.problem.measured - one for one in (fit.predicted, least)]
+            residuals = [self.problem.measured - one for one in self._responses(names)]
             own = map((fit.covariance or self.covariance).discrepancy.besides_courses, residuals)
             self._errors[names] = known = (
                 fit.predicted, min(map(rms, residuals)), min(map(rms, own)))
         return known
 
+    def _responses(self, names: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the response of a set, and that by least squares."""
+        fit = self.fits[names]
+        return fit.predicted, (self._least[names] if names in self._least
+                               else self.fitter.towards_least(fit))
+
     def noise_free_rmse(self, names: frozenset[str]) -> float:
         """
-        Return the root mean square of a set's residual without white noise, as `own_error`.
+        Return the size of a set's residual without white noise, as an error of the base model.
 
-        What is larger than the base model's own error could be, and not as large at all times, is
-        no noise: it has a cause. Where it depends on how much is noise whether the base model
-        suffices, it is the most that it may be at 95 %.
+        It is as improbable as one of that RMSE, where each row counts by what it may be off by: see
+        `Covariance.relative_size`. What is larger than the base model's own error could be, and not
+        as large at all times, is no noise: it has a cause. Where it depends on how much is noise
+        whether the base model suffices, it is the most that it may be at 95 %.
         """
-        square = self.own_error(names) ** 2
         noise = 0.0 if self.uneven(names) else self.fits[names].noise
-        beyond = square - self.largest_rmse ** 2
+        beyond = self.own_error(names) ** 2 - self.largest_rmse ** 2
         if noise ** 2 < beyond < (MUCH_MORE * noise) ** 2:
             noise = self._noise_at_most(names)
-        return math.sqrt(max(square - noise ** 2, 0.0))
+        fit = self.fits[names]
+        known = self._sizes.get(names)
+        if known is None or known[0] is not fit.predicted or known[1] != noise:
+            covariance = fit.covariance or self.covariance
+            relative = min(covariance.relative_size(
+                self.problem.measured - response, noise, np.random.default_rng(self._seed),
+                self.settings.draws, ADEQUATE) for response in self._responses(names))
+            self._sizes[names] = known = (
+                fit.predicted, noise, relative * self._largest_error(covariance))
+        return known[2]
 
     def _noise_at_most(self, names: frozenset[str]) -> float:
         """Return the white noise of a set's residual that it stays below at 95 %."""
