@@ -25,7 +25,7 @@ from hysteresis_ros.diagnosis.significance import surely_larger, typical_error
 from hysteresis_ros.effects import Effect, SensorEffect
 from hysteresis_ros.errors import MeasurementError
 from hysteresis_ros.identification.bench import LEVELS
-from hysteresis_ros.identification.bench_metrics import drive_slope, left_out
+from hysteresis_ros.identification.bench_metrics import drive_slope, left_out, rows_left_out
 from hysteresis_ros.identification.grid import FOLLOWING
 from hysteresis_ros.identification.least_squares import (
     fit_weights, SLACK, WEAKER_STRENGTHS)
@@ -352,6 +352,9 @@ class BenchProblem(Problem):
         found = dataclasses.replace(
             self.model, effects=list(effects), length_stage=stage, replicates=[])
         slope = self.pick([drive_slope(found, one) for one in self.measurements])
-        found.metrics = {**found.metrics, 'length': {**found.metrics.get('length', {}), **left_out(
-            by_trials, self.measured, self.trial, self.signals.get('load'), slope)}}
+        load = self.signals.get('load')
+        found.metrics = {**found.metrics, 'length': {
+            **found.metrics.get('length', {}),
+            **left_out(by_trials, self.measured, self.trial, load, slope),
+            **rows_left_out(fit, self.trial, load)}}
         return found

@@ -202,8 +202,8 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     """
     Return the root mean square error of the length [m] that the bench has shown under a load.
 
-    Under the bench's own loads it is the larger one of that on rows that were fitted and on trials
-    that were not. What a load shows beyond that when it is left out, it shows at its distance from
+    Under the bench's own loads it is the larger one of that on rows left out one at a time and on
+    trials that were not fitted. What a load shows beyond that when it is left out, it shows at its distance from
     the nearest one that stays; between and beyond the loads it counts in proportion to theirs,
     which are half as large in the middle between two. Errors of few rows are uncertain, so that
     those of near loads are averaged, with Gaussian weights as wide as loads are apart. With fewer
@@ -220,14 +220,14 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     ndarray, shape (n,)
     """
     metrics = model.metrics.get('length', {})
-    left_out, fitted, verified = (
+    left_out, fitted, rows, verified = (
         [np.array(metrics.get(part, {}).get(key, ()), dtype=float)
          for key in ('loads', 'rmse_by_load')]
-        for part in ('left_out', 'identification', 'verification'))
+        for part in ('left_out', 'identification', 'rows_left_out', 'verification'))
     loads, errors = left_out
     if len(loads) < FEWEST_LOADS or len(fitted[0]) != len(loads):
         return np.full(len(load), length_error(model))
-    at_loads = fitted[1]
+    at_loads = np.maximum(fitted[1], rows[1]) if len(rows[1]) == len(loads) else fitted[1]
     if len(verified[0]):
         at_loads = np.maximum(at_loads, np.interp(loads, verified[0], verified[1]))
     gaps = np.diff(loads)

@@ -21,7 +21,7 @@ from hysteresis_ros import __version__
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.errors import IdentificationError, ParameterError
 from hysteresis_ros.identification.baselines import fit_linear
-from hysteresis_ros.identification.bench_metrics import drive_slope, left_out, measure
+from hysteresis_ros.identification.bench_metrics import drive_slope, left_out, measure, rows_left_out
 from hysteresis_ros.identification.first_stage import first_stage_from_lengths
 from hysteresis_ros.identification.least_squares import WeightFit
 from hysteresis_ros.identification.operators import fit_operator
@@ -228,9 +228,11 @@ def identify(length: Measurement | None = None, force: Measurement | None = None
         rows = fitted_rows(length, length_trials, length_rows)
         fitted = length.where(rows)
         load = fitted.column(fitted.load) if fitted.load else None
-        model.metrics['length'].update(left_out(
-            length_fit, fitted.column(fitted.response), fitted.column('trial'), load,
-            None if slope is None else slope[rows]))
+        trial = fitted.column('trial')
+        model.metrics['length'].update({
+            **left_out(length_fit, fitted.column(fitted.response), trial, load,
+                       None if slope is None else slope[rows]),
+            **rows_left_out(length_fit, trial, load)})
     model.provenance = _provenance(force, force_trials, length, length_trials)
     return Identified(model, force_fit, length_fit, force, length)
 

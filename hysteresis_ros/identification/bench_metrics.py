@@ -126,3 +126,27 @@ def left_out(fit: WeightFit, response: np.ndarray, groups: np.ndarray,
     by_load = {} if load is None else rmse_by_load(fit.held_out, load, groups)
     return {'left_out': {'rmse': fit.held_out_rmse, **by_load,
                          **relative_rmse(fit.held_out, response, groups, slope)}}
+
+
+def rows_left_out(fit: WeightFit, groups: np.ndarray, load: np.ndarray | None = None
+                  ) -> dict[str, Any]:
+    """
+    Return the metric of rows that were left out of the fit, one at a time.
+
+    Parameters
+    ----------
+    fit : WeightFit
+        Of H2.
+    groups : ndarray, shape (n,)
+        Trial of each row fitted.
+    load : ndarray, shape (n,), optional
+        Their load.
+
+    Returns
+    -------
+    dict
+        'rows_left_out'.
+    """
+    residual = fit.rows_left_out
+    by_load = {} if load is None else rmse_by_load(residual, load, groups)
+    return {'rows_left_out': {'rmse': float(np.sqrt(np.mean(residual ** 2))), **by_load}}

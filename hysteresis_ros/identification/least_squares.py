@@ -33,7 +33,7 @@ from scipy import linalg, sparse
 from hysteresis_ros.errors import IdentificationError
 from hysteresis_ros.identification.nonnegative import (
     extrapolated, quick_weights, solve_nonnegative)
-from hysteresis_ros.identification.weight_fit import WeightFit
+from hysteresis_ros.identification.weight_fit import LEAST_LEFT, WeightFit
 from hysteresis_ros.workers import one_blas_thread
 
 __all__ = ['Anchor', 'SLACK', 'STRENGTHS', 'WeightFit', 'fit_weights', 'folds_of',
@@ -47,8 +47,6 @@ WEAKER_STRENGTHS = np.logspace(-9.5, -7.0, 6)
 # Weights fit equally well if their RMSE is larger by at most this share of the output range plus
 # this share of the smallest RMSE.
 SLACK = 2.5e-4, 0.01
-# A row that alone determines a weight counts with its error over this.
-LEAST_LEFT = 1e-3
 BLOCKS = 5          # blocks of steps held out in turn when there is one trial only
 FOLDS = 8           # more trials than this share folds, so that the time stays bounded
 
@@ -243,10 +241,11 @@ class _Problem:
         passive = (x > 0.0) | self.free
         block = self.design[:, passive]
         covariance = np.linalg.pinv(block.T @ block, hermitian=True)
+        leverage = np.sum((block @ covariance) * block, axis=1)
         errors = self.design @ x - self.target
         freedom = max(1, len(errors) - int(np.count_nonzero(passive)))
         noise = float(np.sqrt(np.sum(errors ** 2) / freedom))
-        return self._result(x, passive, covariance, noise, 0.0, np.zeros(0), np.zeros(0))
+        return self._result(x, passive, covariance, leverage, noise, 0.0, np.zeros(0), np.zeros(0))
 
     @functools.cached_property
     def _curvature(self) -> np.ndarray:
@@ -353,8 +352,8 @@ class _Problem:
         else:
             freedom = max(1.0, len(self.target) - float(np.sum(leverage)))
             noise = float(np.sqrt(np.sum((self.design @ x - self.target) ** 2) / freedom))
-        return self._result(x, passive, covariance, noise, float(strength), np.array(strengths),
-                            np.array(validation) * self.output_range, held_out)
+        return self._result(x, passive, covariance, leverage, noise, float(strength),
+                            np.array(strengths), np.array(validation) * self.output_range, held_out)
 
     def _polish(self, x: np.ndarray, passive: np.ndarray, strength: float) -> np.ndarray:
         """Solve again for the unknowns off their bound, without squaring the condition."""
@@ -365,9 +364,9 @@ class _Problem:
         polished[passive] = linalg.lstsq(design, target, lapack_driver='gelsy')[0]
         return np.where(self.free, polished, np.maximum(polished, 0.0))
 
-    def _result(self, x: np.ndarray, passive: np.ndarray, covariance: np.ndarray, noise: float,
-                strength: float, strengths: np.ndarray, validation: np.ndarray,
-                held_out: np.ndarray | None = None) -> WeightFit:
+    def _result(self, x: np.ndarray, passive: np.ndarray, covariance: np.ndarray,
+                leverage: np.ndarray, noise: float, strength: float, strengths: np.ndarray,
+                validation: np.ndarray, held_out: np.ndarray | None = None) -> WeightFit:
         weights = x[:-1] * self.unit[:-1]
         bias = float(x[-1] * self.unit[-1] + self.anchor.value - self.anchor.row @ weights)
         triangle = self._reduced[0]
@@ -387,4 +386,4 @@ class _Problem:
             noise_std=noise * self.output_range, active=np.flatnonzero(passive),
             covariance=covariance * scaled, origin=self.anchor.row,
             held_out=(np.full(len(target), np.nan) if held_out is None
-                      else held_out * self.output_range))
+                      else held_out * self.output_range), leverage=leverage)

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special    # its stats take a second to import
 
+# A row that alone determines a weight counts with its error over this.
+LEAST_LEFT = 1e-3
+
 
 @dataclass(frozen=True)
 class WeightFit:
@@ -48,6 +51,8 @@ class WeightFit:
     held_out : ndarray, shape (M,)
         Output minus target at the strength chosen, each row held out with its fold; NaN if nothing
         was held out.
+    leverage : ndarray, shape (M,)
+        By how much each row pulls the fit to itself, 0 to 1.
     """
 
     weights: np.ndarray
@@ -67,6 +72,17 @@ class WeightFit:
     covariance: np.ndarray
     origin: np.ndarray
     held_out: np.ndarray
+    leverage: np.ndarray
+
+    @property
+    def rows_left_out(self) -> np.ndarray:
+        """
+        Output minus target of each row, shape (M,), as if that row alone had been left out.
+
+        Weights at their bound stay there (PRESS: Allen, Technometrics 16 (1974) 125).
+        """
+        left_out: np.ndarray = self.residual / np.maximum(1.0 - self.leverage, LEAST_LEFT)
+        return left_out
 
     @property
     def held_out_rmse(self) -> float:
