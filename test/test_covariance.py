@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Covariance of residuals: its parts are estimated, and whitening makes rows independent."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy import optimize, stats
@@ -223,6 +225,65 @@ def test_the_largest_error_is_the_quantile_of_draws_of_any_scale():
     size = 0.01 * np.exp(0.8 * rng.standard_normal(200000)) * np.abs(rng.standard_normal(200000))
     expected = np.hypot(np.quantile(size, 0.95), 0.03)
     assert covariance.largest_error(rng, 20000) == pytest.approx(expected, rel=0.05)
+
+
+def uneven(rows=ROWS, small=0.01, large=0.1):
+    """Return covariances of a discrepancy that is small in the first half of the rows."""
+    size = np.where(np.arange(rows) < rows // 2, small, large)
+    found = dataclasses.replace(smooth(rows, 1.0), parts=size[:, None])
+    return Covariance(found, 30.0 * np.arange(1.0, rows + 1.0), np.zeros(rows, int), 1e-4, np.inf,
+                      0.3), size
+
+
+def relative(covariance, residual, noise=0.0):
+    return covariance.relative_size(residual, noise, np.random.default_rng(1), 2000, 0.95)
+
+
+def test_the_size_of_a_residual_is_one_where_a_draw_in_twenty_is_larger():
+    """Whatever white noise is in the rows, and where the discrepancy is the same in all rows."""
+    covariance, rng = make(), np.random.default_rng(11)
+    root = np.linalg.cholesky(covariance.discrepancy.matrix() + 1e-12 * np.eye(ROWS))
+    draws = root @ rng.standard_normal((ROWS, 300)) * np.exp(0.3 * rng.standard_normal(300))
+    for noise in (0.0, 0.01, 0.1):
+        rows = draws + noise * rng.standard_normal(draws.shape)
+        sizes = np.array([relative(covariance, one, noise) for one in rows.T])
+        assert 0.02 < np.mean(sizes > 1.0) < 0.09
+    assert relative(covariance, np.full(ROWS, 0.02)) == pytest.approx(
+        0.02 / covariance.largest_error(np.random.default_rng(1), 2000), rel=0.05)
+
+
+def test_noise_alone_has_no_size():
+    noise = 0.05 * np.random.default_rng(12).standard_normal(ROWS)
+    assert relative(make(), noise, 0.05) < 1.0 < relative(make(), noise)
+
+
+def test_a_residual_is_larger_where_the_model_is_surer_of_the_response():
+    """The same residual in rows that may be off by little, or by much."""
+    covariance, size = uneven()
+    first = 0.1 * (size < 0.05)
+    assert relative(covariance, first) > 1.15 * relative(covariance, first[::-1])
+
+
+def test_that_the_model_is_surer_than_on_average_says_little():
+    """Its size is known better than its place: rows with almost none count as with the mean."""
+    sure, surer = (relative(uneven(small=small)[0], np.full(ROWS, 0.1)) for small in (1e-2, 1e-5))
+    assert surer == pytest.approx(sure, rel=0.05)
+
+
+def test_a_few_rows_do_not_decide_of_what_size_a_residual_is():
+    """A tenth of the rows is off by ten times what the others are: 10 sizes by its square."""
+    residual = np.full(ROWS, 0.01)
+    residual[::10] = 0.1
+    equal = np.full(ROWS, np.sqrt(np.mean(residual ** 2)))
+    assert relative(make(), residual) < 0.7 * relative(make(), equal)
+
+
+def test_what_has_one_course_has_no_size():
+    course = np.linspace(-1.0, 1.0, ROWS) ** 3
+    covariance = make()
+    covariance.discrepancy = dataclasses.replace(covariance.discrepancy, kept=course)
+    assert relative(covariance, 0.4 * course) == 0.0
+    assert relative(covariance, -0.4 * course) > 1.0
 
 
 def test_the_scale_of_the_discrepancy_has_a_bound():

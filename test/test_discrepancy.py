@@ -116,6 +116,20 @@ def test_a_load_that_leaves_no_mark_is_an_error_of_all_rows_together(problem):
     assert found.besides_courses(0.6 * path) == pytest.approx(0.0 * path, abs=1e-9)
 
 
+@pytest.mark.parametrize('share', [0.0, 0.2, 0.875, 1.0])
+def test_where_part_of_the_wire_follows_its_kinetics_each_place_may_or_may_not(share):
+    """With the variance of a draw; none where all of it does, or nothing."""
+    model = bicep_model()
+    kinetics = [effect_of(model, 'kinetics', share=share)] if share else []
+    problem = problem_for(model.with_effects(kinetics), [runs(model)])
+    none, whole = problem.simulate_many([[], [effect_of(model, 'kinetics', share=1.0)]])
+    assert np.std(whole - none) > 1e-3
+    found = discrepancy.discrepancy_along(
+        problem, kinetics, problem.simulate(kinetics), Settings())
+    assert found.parts[:, -1] ** 2 == pytest.approx(
+        share * (1.0 - share) * (whole - none) ** 2, abs=1e-15)
+
+
 def test_errors_of_rows_that_are_near_on_the_way_and_in_response_are_alike(problem):
     """More so on the same way of the drive than on the way back."""
     predicted, settings = problem.simulate([]), Settings()
@@ -154,6 +168,21 @@ def test_the_largest_error_that_the_bench_has_shown_counts():
     assert error(identification=0.001, verification=0.0004) == 0.0004
     assert error(left_out=None, verification=float('nan')) == 0.0
     assert discrepancy.length_error(bicep_model(metrics={})) == 0.0
+
+
+def test_rows_that_were_fitted_are_off_by_less_than_those_that_are_left_out():
+    """Where no trial verifies, a row left out says what the model is off by under its load."""
+    loads, left_out = (1.0, 3.0, 5.0), [3e-4, 3e-4, 3e-4]
+    parts = {'left_out': left_out, 'identification': [1e-5, 2e-5, 1e-5]}
+
+    def error(**further):
+        return discrepancy.length_errors(
+            bicep_model(metrics=by_load(loads, **parts, **further)), np.array(loads))
+    fitted, rows = error(), error(rows_left_out=[1e-4, 1e-4, 1e-4])
+    assert np.all(fitted < 2.1e-5) and rows == pytest.approx(np.full(3, 1e-4))
+    assert error(rows_left_out=[0.0, 0.0, 0.0]) == pytest.approx(fitted)
+    assert error(rows_left_out=[1e-4] * 3, verification=[2e-4] * 3) == pytest.approx(
+        np.full(3, 2e-4))
 
 
 def by_load(loads, **parts):

@@ -209,6 +209,31 @@ def test_folds_are_whole_trials_or_blocks_of_one():
     assert len(many) == 8 and np.all(np.sum(many, axis=0) == 1)
 
 
+@pytest.mark.parametrize('options', [{'strength': 1e-3}, {'strength': 0.0},
+                                     {'strength': 1e-3, 'emphasis': np.linspace(0.5, 1.5, 30)}])
+def test_rows_left_out_are_off_as_where_each_is_left_out(options):
+    """As long as no weight comes to its bound or leaves it."""
+    design, target, _ = problem(3)
+    weights = np.linspace(1.0, 2.0, design.shape[1])
+    target = design @ weights + 0.1 * np.random.default_rng(4).normal(size=len(target))
+    fit = fit_weights(design, target, **options)
+    assert np.all(fit.weights > 0.0)
+    scale = fit.output_range
+    columns = np.column_stack([design, np.ones(len(target))])
+    emphasis = options.get('emphasis', np.ones(len(target)))
+    emphasis = emphasis / np.sqrt(np.mean(emphasis ** 2))
+    bounded = np.append(np.ones(design.shape[1]), 0.0)
+    for row in (0, 7, 29):
+        rows = np.arange(len(target)) != row
+        root = emphasis[rows, None] * columns[rows]
+        penalty = len(target) * options['strength'] * np.diag(bounded)
+        found = np.linalg.solve(root.T @ root + penalty,
+                                root.T @ (emphasis * target)[rows])
+        assert fit.rows_left_out[row] == pytest.approx(
+            columns[row] @ found - target[row], rel=2e-2, abs=1e-6 * scale)
+    assert np.all(np.abs(fit.rows_left_out) > np.abs(fit.residual))
+
+
 def test_strength_is_the_best_on_held_out_trials():
     nodes, rows, target, groups = preisach_problem()
     scale, penalty = cell_areas(nodes), smoothness(nodes)

@@ -199,6 +199,28 @@ def test_a_single_effect_has_to_be_clearly_more_probable_than_a_model_that_may_d
     assert (single in payload.sets.valid()) == named
 
 
+def test_an_equation_that_contains_anothers_is_no_smaller_set_than_both(payload, monkeypatch):
+    """It says that both act, as in the probability of a set."""
+    model = payload.problem.model
+    lag, both = frozenset(['thermal_lag', 'latency']), frozenset(['heat_loss'])
+    fits = {frozenset(): payload.sets.base}
+    for names in (lag, both):
+        fits[names] = payload.fitter.judge(payload.fitter.fit(
+            [[effect_of(model, name) for name in sorted(names)]], payload.fitting.metric, 0)[0])
+    monkeypatch.setattr(payload.sets, 'fits', fits)
+    assert payload.sets.acting(lag) == payload.sets.acting(both) == 2
+    assert payload.sets.acting(frozenset()) == 0
+    assert 'thermal_lag' in fits[both].effects[0].replaces
+    monkeypatch.setattr(payload.sets, '_each_matters', lambda names: True)
+    monkeypatch.setattr(payload.sets, '_surpassed', lambda names, others: False)
+    monkeypatch.setattr(payload.sets, '_hardly_better', lambda names, fewer: True)
+    monkeypatch.setattr(payload.sets, 'sufficient', lambda names: True)
+    monkeypatch.setattr(payload.sets, 'p_values', {'heat_loss': 0.01})
+    assert {lag, both} <= {*payload.sets.valid()}
+    monkeypatch.setattr(payload.sets, 'acting', len)
+    assert lag not in payload.sets.valid()
+
+
 def test_an_effect_that_has_no_fit_of_its_own_is_judged_in_a_set(payload, monkeypatch):
     pair, single = frozenset(['payload_error', 'frame_tilt']), frozenset(['payload_error'])
     fits = {frozenset(): payload.sets.base, single: payload.sets.fits[single]}

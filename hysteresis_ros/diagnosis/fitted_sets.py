@@ -124,9 +124,12 @@ class FittedSets:
         An effect whose equation contains that of another one says that both act.
         """
         fit = self.fits[names]
-        acting = len(names) + sum(bool(effect.replaces) for effect in fit.effects)
         rarer = sum(math.log(effect.prior_odds) for effect in fit.effects)
-        return fit.log_evidence / self.temper + self.odds * acting + rarer
+        return fit.log_evidence / self.temper + self.odds * self.acting(names) + rarer
+
+    def acting(self, names: frozenset[str]) -> int:
+        """Return how many effects act in a set, as `log_posterior` counts them."""
+        return len(names) + sum(bool(effect.replaces) for effect in self.fits[names].effects)
 
     def ranked(self) -> list[frozenset[str]]:
         """Return all sets that were fitted, most probable first."""
@@ -309,8 +312,8 @@ class FittedSets:
                  and (len(names) != 1 or self.p_values.get(next(iter(names)), 1.0) <= SIGNIFICANCE)
                  and not self._surpassed(names, physical)]
         return [names for names in valid if not any(
-            0 < len(fewer) < len(names) and self.sufficient(fewer)
-            and self._hardly_better(names, fewer) for fewer in valid)]
+            0 < len(fewer) < len(names) and self.acting(fewer) < self.acting(names)
+            and self.sufficient(fewer) and self._hardly_better(names, fewer) for fewer in valid)]
 
     def _form_in_doubt(self, names: frozenset[str]) -> bool:
         """Whether an effect of a set has a form whose size the rows do not determine."""
