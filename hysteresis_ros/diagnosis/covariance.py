@@ -100,7 +100,7 @@ def noise_of(values: np.ndarray) -> float:
 
 
 def _equal_square(whitened: np.ndarray) -> np.ndarray:
-    """Return the square of equal rows that are as probable by Student's t as rows (n,) or (n, k)."""
+    """Return the square of equal rows as probable by Student's t as some, (n,) or (n, k)."""
     square: np.ndarray = TAILS * np.expm1(np.mean(np.log1p(whitened ** 2 / TAILS), axis=0))
     return square
 

@@ -203,11 +203,11 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     Return the root mean square error of the length [m] that the bench has shown under a load.
 
     Under the bench's own loads it is the larger one of that on rows left out one at a time and on
-    trials that were not fitted. What a load shows beyond that when it is left out, it shows at its distance from
-    the nearest one that stays; between and beyond the loads it counts in proportion to theirs,
-    which are half as large in the middle between two. Errors of few rows are uncertain, so that
-    those of near loads are averaged, with Gaussian weights as wide as loads are apart. With fewer
-    than three loads it is one number for all.
+    trials that were not fitted. What a load shows beyond that when it is left out, it shows at its
+    distance from the nearest one that stays; between and beyond the loads it counts in proportion
+    to theirs, which are half as large in the middle between two. Errors of few rows are uncertain,
+    so that those of near loads are averaged, with Gaussian weights as wide as loads are apart. With
+    fewer than three loads it is one number for all.
 
     Parameters
     ----------

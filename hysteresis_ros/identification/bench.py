@@ -21,7 +21,8 @@ from hysteresis_ros import __version__
 from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.errors import IdentificationError, ParameterError
 from hysteresis_ros.identification.baselines import fit_linear
-from hysteresis_ros.identification.bench_metrics import drive_slope, left_out, measure, rows_left_out
+from hysteresis_ros.identification.bench_metrics import (
+    drive_slope, left_out, measure, rows_left_out)
 from hysteresis_ros.identification.first_stage import first_stage_from_lengths
 from hysteresis_ros.identification.least_squares import WeightFit
 from hysteresis_ros.identification.operators import fit_operator
