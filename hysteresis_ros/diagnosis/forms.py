@@ -116,6 +116,10 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
             fits.append(trial.fit(begun.effects))
         return _Scored.of(trial, min(fits, key=lambda one: trial.error(one.predicted)))
 
+    def undetermined(fit: Fit) -> set[str]:
+        return {effect.id for effect in trial.with_intervals(fit)
+                if not_determined(effect, trial.problem.kind)}
+
     def better(other: _Scored, than: _Scored) -> bool:
         odds = other.log_odds(than)
         if abs(odds) > least:
@@ -137,9 +141,9 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
             present, chosen = plain, plain.fit
     for forms in others:
         other = fitted({**simplest, **forms} if chosen is not None else forms)
+        # What rows do not determine in another form, either, says nothing of this one.
         if (not other.fit.implausible() and better(other, present)
-                and not any(not_determined(effect, trial.problem.kind)
-                            for effect in trial.with_intervals(other.fit))):
+                and undetermined(other.fit) <= undetermined(present.fit)):
             present, chosen = other, other.fit
     if chosen is None:
         return list(effects)
