@@ -278,6 +278,14 @@ def test_a_few_rows_do_not_decide_of_what_size_a_residual_is():
     assert relative(make(), residual) < 0.7 * relative(make(), equal)
 
 
+def test_a_row_that_is_off_by_more_than_heavy_tails_decides():
+    """A reading that is wrong; of 120 rows one is off by nine standard deviations by chance."""
+    for sigmas in (5.0, 30.0):
+        residual = np.zeros(ROWS)
+        residual[30] = 0.01 * sigmas
+        assert (relative(make(), residual) > 1.0) == (sigmas > 9.0)
+
+
 def test_what_has_one_course_has_no_size():
     course = np.linspace(-1.0, 1.0, ROWS) ** 3
     covariance = make()

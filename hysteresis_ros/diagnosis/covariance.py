@@ -105,6 +105,12 @@ def _equal_square(whitened: np.ndarray) -> np.ndarray:
     return square
 
 
+def _largest_square(whitened: np.ndarray) -> np.ndarray:
+    """Return the largest square of rows, (n,) or (n, k)."""
+    largest: np.ndarray = np.max(whitened ** 2, axis=0)
+    return largest
+
+
 class Covariance:
     """
     Covariances of residuals on the rows of one problem.
@@ -276,7 +282,8 @@ class Covariance:
         Each row counts by the variance that it may have, as an error that is small where the arm
         moves far is large where it rests: that of discrepancy, noise, and once more what the base
         model is off by on average, whose size is known better than its place. Sizes are those of
-        equal rows as probable by Student's t, so that single rows do not decide.
+        equal rows as probable by Student's t, so that single rows do not decide, unless one is
+        further off than its tails say.
 
         Parameters
         ----------
@@ -299,11 +306,16 @@ class Covariance:
         scale = np.exp(self._spread * rng.standard_normal(count))
         draws = scale * (root @ rng.standard_normal((len(values), count)))
         white = noise * rng.standard_normal(draws.shape)
+        heavy = draws * np.sqrt(TAILS / rng.chisquare(TAILS, draws.shape))
         own = self.discrepancy.besides_courses(residual, deviation)
-        of_noise = np.median(_equal_square(white / deviation[:, None]))
-        largest = np.quantile(_equal_square((draws + white) / deviation[:, None]), level)
-        beyond = float(_equal_square(own / deviation) - of_noise)
-        return math.sqrt(max(beyond, 0.0) / max(float(largest - of_noise), _TINY))
+        square = 0.0
+        for measure, drawn in ((_equal_square, draws), (_largest_square, heavy)):
+            found, of_noise, of_all = (measure((rows.T / deviation).T)
+                                       for rows in (own, white, drawn + white))
+            beyond = np.median(of_noise)
+            square = max(square, float(
+                (found - beyond) / max(np.quantile(of_all, level) - beyond, _TINY)))
+        return math.sqrt(square)
 
     def fit(self, residual: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
         """
