@@ -74,6 +74,26 @@ def test_the_error_of_loads_left_out_is_kept(two_loads, tmp_path):
     assert 'left_out' not in one.metrics['length']
 
 
+def test_the_error_of_rows_left_out_is_kept_by_load(two_loads, tmp_path):
+    """Of the last fit of the weights, with effects or without, and of one load, too."""
+    length, force = tables()
+    found = identify(length, force, length_trials=range(4), force_trials=[0])
+    rows = found.model.metrics['length']['rows_left_out']
+    assert rows['rmse'] == pytest.approx(np.sqrt(np.mean(found.length_fit.rows_left_out ** 2)))
+    assert rows['rmse'] > found.model.metrics['length']['identification']['rmse']
+    assert rows['loads'] == found.model.metrics['length']['identification']['loads']
+    assert np.mean(np.square(rows['rmse_by_load'])) == pytest.approx(rows['rmse'] ** 2)
+    extended, _ = add_effects(found.model, length, force, ['stress_dependent_strain'],
+                              length_trials=range(4), force_trials=[0])
+    after = extended.metrics['length']['rows_left_out']
+    assert after != rows and after['rmse'] > extended.metrics['length']['identification']['rmse']
+    two_loads.save(tmp_path / 'model.yaml')
+    assert (MuscleModel.load(tmp_path / 'model.yaml').metrics['length']['rows_left_out']
+            == two_loads.metrics['length']['rows_left_out'])
+    one = identify(length, force, length_trials=[0], force_trials=[0]).model
+    assert one.metrics['length']['rows_left_out']['rmse'] > 0.0
+
+
 def test_effects_change_the_error_of_loads_left_out(two_loads):
     length, force = tables()
     base = identify(length, force, length_trials=range(4), force_trials=[0]).model

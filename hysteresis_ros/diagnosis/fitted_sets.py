@@ -297,14 +297,14 @@ class FittedSets:
         Return the sets that may be the answer, most probable first.
 
         All values are physical, the size of a form that was chosen is determined, and each effect
-        matters: without it the error is larger by a
-        practical size, and by more than the expected error of the base model; or, as that repeats
-        itself with the drive, it remembers something of its own, and the set is clearly less
-        probable without it. And without it the error is larger than the base model's own could be,
-        or what stays is clearly less probable. A single effect also has to explain more than the
-        best of all would by chance; no set of as few effects has a smaller residual, by more than
-        the base model's error and that of an effect's equation could be; and no set of fewer
-        effects suffices with a residual that is as small but for the base model's error.
+        matters: without it the error is larger by a practical size, and by more than the expected
+        error of the base model; or, as that repeats itself with the drive, it remembers something
+        of its own, and the set is clearly less probable without it. And without it the error is
+        larger than the base model's own could be, or what stays is clearly less probable. A single
+        effect also has to explain more than the best of all would by chance; no set of as few
+        effects has a smaller residual, by more than the base model's error and that of an effect's
+        equation could be; and no set of fewer effects, of which fewer act, suffices with a residual
+        that is as small but for the base model's error.
         """
         physical = [names for names in self.ranked() if not self.fits[names].implausible()
                     and not self._form_in_doubt(names)]
