@@ -194,7 +194,8 @@ class _Verdict:
 
     def _unexplained(self, chosen: frozenset[str]) -> float:
         """Share of the first mean square that neither set nor base model nor noise explains."""
-        beyond = self.sets.noise_free_rmse(chosen) ** 2 - self.sets.largest_rmse ** 2
+        beyond = (self.sets.own_error(chosen) ** 2 - self.sets.white_noise(chosen) ** 2
+                  - self.sets.largest_rmse ** 2)
         first = self.sets.own_error(frozenset()) ** 2
         return float(np.clip(beyond / max(first, 1e-300), 0.0, 1.0))
 

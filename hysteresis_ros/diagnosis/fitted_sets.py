@@ -79,7 +79,7 @@ class FittedSets:
         self._least: dict[frozenset[str], np.ndarray] = {}
         # Each with the response that it belongs to.
         self._errors: dict[frozenset[str], tuple[np.ndarray, float, float]] = {}
-        self._sizes: dict[frozenset[str], tuple[np.ndarray, float, float]] = {}
+        self._sizes: dict[frozenset[str], tuple[np.ndarray, Covariance, float, float]] = {}
         self._largest_noises: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self._noise_p_values: dict[frozenset[str], tuple[np.ndarray, float]] = {}
         self._predicts: dict[frozenset[str], tuple[np.ndarray, bool]] = {}
@@ -191,24 +191,33 @@ class FittedSets:
         Return the size of a set's residual without white noise, as an error of the base model.
 
         It is as improbable as one of that RMSE, where each row counts by what it may be off by: see
-        `Covariance.relative_size`. What is larger than the base model's own error could be, and not
-        as large at all times, is no noise: it has a cause. Where it depends on how much is noise
-        whether the base model suffices, it is the most that it may be at 95 %.
+        `Covariance.relative_size`.
+        """
+        fit, noise = self.fits[names], self.white_noise(names)
+        covariance = fit.covariance or self.covariance
+        known = self._sizes.get(names)
+        if (known is None or known[0] is not fit.predicted or known[1] is not covariance
+                or known[2] != noise):
+            relative = min(covariance.relative_size(
+                self.problem.measured - response, noise, np.random.default_rng(self._seed),
+                self.settings.draws, ADEQUATE) for response in self._responses(names))
+            self._sizes[names] = known = (
+                fit.predicted, covariance, noise, relative * self._largest_error(covariance))
+        return known[3]
+
+    def white_noise(self, names: frozenset[str]) -> float:
+        """
+        Return how much of a set's residual is white noise, in the unit of the response.
+
+        What is larger than the base model's own error could be, and not as large at all times, is
+        no noise: it has a cause. Where it depends on how much is noise whether the base model
+        suffices, it is the most that it may be at 95 %.
         """
         noise = 0.0 if self.uneven(names) else self.fits[names].noise
         beyond = self.own_error(names) ** 2 - self.largest_rmse ** 2
         if noise ** 2 < beyond < (MUCH_MORE * noise) ** 2:
             noise = self._noise_at_most(names)
-        fit = self.fits[names]
-        known = self._sizes.get(names)
-        if known is None or known[0] is not fit.predicted or known[1] != noise:
-            covariance = fit.covariance or self.covariance
-            relative = min(covariance.relative_size(
-                self.problem.measured - response, noise, np.random.default_rng(self._seed),
-                self.settings.draws, ADEQUATE) for response in self._responses(names))
-            self._sizes[names] = known = (
-                fit.predicted, noise, relative * self._largest_error(covariance))
-        return known[2]
+        return noise
 
     def _noise_at_most(self, names: frozenset[str]) -> float:
         """Return the white noise of a set's residual that it stays below at 95 %."""
