@@ -247,6 +247,13 @@ class Covariance:
         self.points.append(found)
         return found
 
+    def _draws(self, matrix: np.ndarray, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Return draws (n, count) of errors with a covariance (n, n), each of its own scale."""
+        values, vectors = linalg.eigh(matrix)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        draws: np.ndarray = root @ rng.standard_normal((len(values), count))
+        return draws * np.exp(self._spread * rng.standard_normal(count))
+
     def largest_error(self, rng: np.random.Generator, count: int, level: float = 0.95,
                       courses: bool = True) -> float:
         """
@@ -267,11 +274,8 @@ class Covariance:
         float
             In the unit of the response.
         """
-        values, vectors = linalg.eigh(self.discrepancy.matrix(courses))
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        draws = root @ rng.standard_normal((len(values), count))
-        scale = np.exp(self._spread * rng.standard_normal(count))
-        errors = scale * np.sqrt(np.mean(draws ** 2, axis=0))
+        draws = self._draws(self.discrepancy.matrix(courses), rng, count)
+        errors = np.sqrt(np.mean(draws ** 2, axis=0))
         return float(np.hypot(np.quantile(errors, level), self.resolution))
 
     def relative_size(self, residual: np.ndarray, noise: float, rng: np.random.Generator,
@@ -301,10 +305,7 @@ class Covariance:
         noise = max(noise, self.resolution)
         deviation = np.sqrt(np.diag(matrix) + noise ** 2
                             + self.discrepancy.size_besides_courses ** 2)
-        values, vectors = linalg.eigh(matrix)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        scale = np.exp(self._spread * rng.standard_normal(count))
-        draws = scale * (root @ rng.standard_normal((len(values), count)))
+        draws = self._draws(matrix, rng, count)
         white = noise * rng.standard_normal(draws.shape)
         heavy = draws * np.sqrt(TAILS / rng.chisquare(TAILS, draws.shape))
         own = self.discrepancy.besides_courses(residual, deviation)

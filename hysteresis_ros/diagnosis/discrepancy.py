@@ -408,9 +408,8 @@ def kinetics_spread(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarra
     if own is None or not 0.0 < own.share < 1.0:
         return np.zeros(len(problem.measured))
     others = [effect for effect in effects if effect is not own]
-    without, whole = problem.simulate_many([others, [*others, own.with_values(share=1.0)]])
-    spread: np.ndarray = math.sqrt(own.share * (1.0 - own.share)) * (whole - without)
-    return spread
+    return math.sqrt(own.share * (1.0 - own.share)) * _change_by(
+        own.with_values(share=1.0), problem, others)
 
 
 def _change_by(effect: Effect, problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

@@ -230,7 +230,7 @@ class FittedSets:
         return known[1]
 
     def uneven(self, names: frozenset[str]) -> bool:
-        """Whether a set's residual looks like noise, but has a cause: see `noise_free_rmse`."""
+        """Whether a set's residual looks like noise, but has a cause: see `white_noise`."""
         return (self.fits[names].noise > self.largest_rmse
                 and self._noise_p_value(names) <= NOISE_SIGNIFICANCE)
 
