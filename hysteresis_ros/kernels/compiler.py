@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator
 import contextlib
 import logging
 import os
+from pathlib import Path
 import threading
 from typing import Any, TypeVar
 
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
 from numba.extending import typeof_impl
@@ -37,7 +38,7 @@ def compile_and_keep(function: Function) -> Function:
     folder = cache_folder() if isinstance(compiled, Dispatcher) else None
     if folder is not None:
         with _caching_in(folder):
-            compiled._cache = KernelCache(function)
+            compiled._cache = KernelCache(function, folder)
     return compiled
 
 
@@ -83,7 +84,25 @@ class KernelCache(FunctionCache):
     an index at once take the same file name for different code. And a file cut off by a power
     failure would end every later run with an error. Here a lock goes around each access, and what
     cannot be read is compiled anew.
+
+    Numba keeps what it compiles by the place and the time of the source. The folder's name stands
+    for what the sources of this package hold, so that each copy of them, such as a checkout and
+    what was installed from it, takes what another one has compiled.
+
+    Parameters
+    ----------
+    function : callable
+        What is compiled.
+    folder : Path
+        That of `cache_folder`.
     """
+
+    def __init__(self, function: Callable, folder: Path) -> None:
+        super().__init__(function)
+        if Path(function.__code__.co_filename).parent == Path(__file__).parent:
+            self._cache_path = str(folder)
+            self._cache_file = IndexDataCacheFile(
+                self._cache_path, self._impl.filename_base, source_stamp=None)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled function for a signature, or None if it is not there."""

@@ -4,8 +4,8 @@
 Make the compiled functions ready before they are needed.
 
 A function is compiled, or read from the cache, when it is first called. In a control loop that
-would be a pause of seconds, so each loop is run through once before it counts. After an
-installation, `python -m hysteresis_ros.kernels.warm_up` fills the cache.
+would be a pause of seconds, so each loop is run through once before it counts. The cache is filled
+after an installation: see `compile_kernels`.
 """
 
 from __future__ import annotations
