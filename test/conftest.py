@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 # Whole diagnoses and whole sessions, by file: marked as slow, as single tests may be, too.
-SLOW = ('test_bench_diagnosis', 'test_demo', 'test_diagnose', 'test_faults',
+SLOW = ('test_bench_diagnosis', 'test_bench_kinetics', 'test_demo', 'test_diagnose', 'test_faults',
         'test_firmware_machine_code', 'test_fuzz', 'test_kernel_cache', 'test_link_states',
         'test_loads', 'test_page_in_browser', 'test_readme', 'test_studio_in_browser',
         'test_table1')

@@ -74,6 +74,15 @@ def verdict():
     return _Verdict(heavier(bicep_model()))
 
 
+def test_noise_and_what_the_model_may_be_off_by_are_not_unexplained(verdict, monkeypatch):
+    sets, chosen = verdict.sets, frozenset(['payload_error'])
+    monkeypatch.setattr(sets, 'own_error', lambda names: 0.3 if names == chosen else 0.5)
+    monkeypatch.setattr(sets, 'largest_rmse', 0.1)
+    for noise, share in ((0.0, 0.08 / 0.25), (0.2, 0.04 / 0.25), (0.29, 0.0)):
+        monkeypatch.setattr(sets, 'white_noise', lambda names, noise=noise: noise)
+        assert verdict._unexplained(chosen) == pytest.approx(share)
+
+
 @pytest.mark.parametrize('other, chosen', [
     # Twins that are together more probable than the set that is more probable than either.
     (0.0, 'encoder_offset'),

@@ -194,7 +194,6 @@ def tables(usual):
     return made(usual, 0.8, loads=(*LOADS, 4.0))
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_identification_adds_them_to_what_the_bench_proves(usual, force, tables, monkeypatch):
     plain = identify(tables, force, **TRIALS).model
@@ -210,7 +209,6 @@ def test_identification_adds_them_to_what_the_bench_proves(usual, force, tables,
     assert all('kinetics' in {effect.id for effect in one.effects} for one in whole.replicates)
 
 
-@pytest.mark.slow
 def test_an_effect_that_is_left_out_is_not_sought_again(usual, force, tables):
     plain = identify(tables, force, **TRIALS).model
     problem = problem_for(plain, [tables.select(range(4))])

@@ -236,7 +236,11 @@ def uneven(rows=ROWS, small=0.01, large=0.1):
 
 
 def relative(covariance, residual, noise=0.0):
-    return covariance.relative_size(residual, noise, np.random.default_rng(1), 2000, 0.95)
+    """Return a residual's size, or those of several (n, k), over the largest error's."""
+    sizes = covariance.equivalent_rmse(
+        np.atleast_2d(residual.T), noise, np.random.default_rng(1), 2000, 0.95)
+    largest = covariance.largest_error(np.random.default_rng(1), 2000, courses=False)
+    return np.squeeze(sizes / largest)
 
 
 def test_the_size_of_a_residual_is_one_where_a_draw_in_twenty_is_larger():
@@ -246,8 +250,7 @@ def test_the_size_of_a_residual_is_one_where_a_draw_in_twenty_is_larger():
     draws = root @ rng.standard_normal((ROWS, 300)) * np.exp(0.3 * rng.standard_normal(300))
     for noise in (0.0, 0.01, 0.1):
         rows = draws + noise * rng.standard_normal(draws.shape)
-        sizes = np.array([relative(covariance, one, noise) for one in rows.T])
-        assert 0.02 < np.mean(sizes > 1.0) < 0.09
+        assert 0.02 < np.mean(relative(covariance, rows, noise) > 1.0) < 0.09
     assert relative(covariance, np.full(ROWS, 0.02)) == pytest.approx(
         0.02 / covariance.largest_error(np.random.default_rng(1), 2000), rel=0.05)
 

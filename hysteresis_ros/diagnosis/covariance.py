@@ -274,14 +274,17 @@ class Covariance:
         float
             In the unit of the response.
         """
-        draws = self._draws(self.discrepancy.matrix(courses), rng, count)
+        return self._largest(self._draws(self.discrepancy.matrix(courses), rng, count), level)
+
+    def _largest(self, draws: np.ndarray, level: float) -> float:
+        """Return the root mean square that draws (n, count) stay below at a probability."""
         errors = np.sqrt(np.mean(draws ** 2, axis=0))
         return float(np.hypot(np.quantile(errors, level), self.resolution))
 
-    def relative_size(self, residual: np.ndarray, noise: float, rng: np.random.Generator,
-                      count: int, level: float) -> float:
+    def equivalent_rmse(self, residuals: Sequence[np.ndarray], noise: float,
+                        rng: np.random.Generator, count: int, level: float) -> np.ndarray:
         """
-        Return the size of a residual over that which the discrepancy stays below, at a probability.
+        Return of residuals the root mean square of an error of the base model as improbable.
 
         Each row counts by the variance that it may have, as an error that is small where the arm
         moves far is large where it rests: that of discrepancy, noise, and once more what the base
@@ -291,15 +294,21 @@ class Covariance:
 
         Parameters
         ----------
-        residual : ndarray, shape (n,)
+        residuals : sequence of ndarray, each of shape (n,)
             Measured less simulated.
         noise : float
-            Standard deviation of the white noise in it, which does not count.
+            Standard deviation of the white noise in them, which does not count.
         rng : numpy.random.Generator
         count : int
             Number of draws.
         level : float
-            The probability.
+            Probability with which the error stays below `largest_error`, of what has no course,
+            which is returned for a residual of that size.
+
+        Returns
+        -------
+        ndarray, shape (residuals,)
+            In the unit of the response.
         """
         matrix = self.discrepancy.matrix(courses=False)
         noise = max(noise, self.resolution)
@@ -308,15 +317,16 @@ class Covariance:
         draws = self._draws(matrix, rng, count)
         white = noise * rng.standard_normal(draws.shape)
         heavy = draws * np.sqrt(TAILS / rng.chisquare(TAILS, draws.shape))
-        own = self.discrepancy.besides_courses(residual, deviation)
-        square = 0.0
+        own = np.stack([self.discrepancy.besides_courses(residual, deviation)
+                        for residual in residuals], axis=1)
+        squares = np.zeros(own.shape[1])
         for measure, drawn in ((_equal_square, draws), (_largest_square, heavy)):
             found, of_noise, of_all = (measure((rows.T / deviation).T)
                                        for rows in (own, white, drawn + white))
             beyond = np.median(of_noise)
-            square = max(square, float(
-                (found - beyond) / max(np.quantile(of_all, level) - beyond, _TINY)))
-        return math.sqrt(square)
+            squares = np.maximum(
+                squares, (found - beyond) / max(np.quantile(of_all, level) - beyond, _TINY))
+        return np.asarray(self._largest(draws, level) * np.sqrt(squares))
 
     def fit(self, residual: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
         """

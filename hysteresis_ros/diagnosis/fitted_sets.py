@@ -191,18 +191,17 @@ class FittedSets:
         Return the size of a set's residual without white noise, as an error of the base model.
 
         It is as improbable as one of that RMSE, where each row counts by what it may be off by: see
-        `Covariance.relative_size`.
+        `Covariance.equivalent_rmse`.
         """
         fit, noise = self.fits[names], self.white_noise(names)
         covariance = fit.covariance or self.covariance
         known = self._sizes.get(names)
         if (known is None or known[0] is not fit.predicted or known[1] is not covariance
                 or known[2] != noise):
-            relative = min(covariance.relative_size(
-                self.problem.measured - response, noise, np.random.default_rng(self._seed),
-                self.settings.draws, ADEQUATE) for response in self._responses(names))
-            self._sizes[names] = known = (
-                fit.predicted, covariance, noise, relative * self._largest_error(covariance))
+            sizes = covariance.equivalent_rmse(
+                [self.problem.measured - response for response in self._responses(names)], noise,
+                np.random.default_rng(self._seed), self.settings.draws, ADEQUATE)
+            self._sizes[names] = known = fit.predicted, covariance, noise, float(np.min(sizes))
         return known[3]
 
     def white_noise(self, names: frozenset[str]) -> float:
