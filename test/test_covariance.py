@@ -17,7 +17,7 @@ ROWS, TRIALS = 120, 3
 def smooth(rows, size):
     """Return a smooth discrepancy of a size."""
     return Discrepancy(np.full((rows, 1), size), np.linspace(0.0, 2.0, rows)[:, None],
-                       np.zeros((rows, 0)), *np.zeros((3, rows)), np.zeros((rows, 0)))
+                       np.zeros((rows, 0)), np.zeros((rows, 0)), np.zeros((rows, 0)))
 
 
 def make(size=0.01, resolution=1e-4, trials=TRIALS, dt=30.0, largest_noise=np.inf):
@@ -31,7 +31,7 @@ def test_a_discrepancy_is_the_sum_of_its_parts_correlated_between_near_rows():
     """By hand for three rows, of which two are at one place."""
     parts = np.array([[3.0, 0.0], [4.0, 1.0], [0.0, 2.0]])
     places = np.array([[0.0, 0.0], [0.0, 0.0], [3.0, 4.0]])
-    found = Discrepancy(parts, places, np.zeros((3, 0)), *np.zeros((3, 3)), np.zeros((3, 0)))
+    found = Discrepancy(parts, places, np.zeros((3, 0)), np.zeros((3, 0)), np.zeros((3, 0)))
     far = 1.0 / np.sqrt(26.0)
     np.testing.assert_allclose(found.matrix(), [
         [9.0, 12.0, 0.0], [12.0, 17.0, 2.0 * far], [0.0, 2.0 * far, 4.0]], atol=1e-12)
@@ -41,9 +41,9 @@ def test_a_discrepancy_is_the_sum_of_its_parts_correlated_between_near_rows():
 def test_equations_that_are_off_are_further_parts_and_none_of_the_models_own():
     parts, places = np.array([[3.0], [4.0], [0.0]]), np.zeros((3, 2))
     equation = np.array([[0.0], [1.0], [2.0]])
-    both, own = (Discrepancy(columns, places, np.zeros((3, 0)), *np.zeros((3, 3)), np.zeros((3, 0)))
+    both, own = (Discrepancy(columns, places, np.zeros((3, 0)), np.zeros((3, 0)), np.zeros((3, 0)))
                  for columns in (np.hstack([parts, equation]), parts))
-    found = Discrepancy(parts, places, np.zeros((3, 0)), *np.zeros((3, 3)), equation)
+    found = Discrepancy(parts, places, np.zeros((3, 0)), np.zeros((3, 0)), equation)
     np.testing.assert_allclose(found.matrix(), both.matrix())
     np.testing.assert_allclose(found.of_model_alone().matrix(), own.matrix())
     assert found.size == own.size < both.size
@@ -53,7 +53,7 @@ def test_common_errors_act_in_all_rows_together():
     """However far apart the rows are."""
     parts, places = np.array([[1.0], [2.0]]), np.array([[0.0], [1e9]])
     common = np.array([[3.0, 0.0], [-1.0, 2.0]])
-    found = Discrepancy(parts, places, common, *np.zeros((3, 2)), np.zeros((2, 0)))
+    found = Discrepancy(parts, places, common, np.zeros((2, 0)), np.zeros((2, 0)))
     np.testing.assert_allclose(found.matrix(), [[10.0, -3.0], [-3.0, 9.0]], atol=1e-6)
     assert found.size == pytest.approx(np.sqrt(19.0 / 2.0))
 
@@ -218,7 +218,7 @@ def test_the_largest_error_is_beyond_the_expected_one_and_grows_with_it():
 def test_the_largest_error_is_the_quantile_of_draws_of_any_scale():
     """A discrepancy that is one number for all rows is normal times log-normal, by sampling."""
     everywhere = Discrepancy(np.full((ROWS, 1), 0.01), np.zeros((ROWS, 1)), np.zeros((ROWS, 0)),
-                             *np.zeros((3, ROWS)), np.zeros((ROWS, 0)))
+                             np.zeros((ROWS, 0)), np.zeros((ROWS, 0)))
     covariance = Covariance(everywhere, 30.0 * np.arange(1.0, ROWS + 1.0), np.zeros(ROWS, int),
                             0.03, np.inf, 0.8)
     rng = np.random.default_rng(8)

@@ -28,7 +28,7 @@ def fitter_of(model, measured, jobs=1):
     problem = problem_for(model, [measured], jobs=jobs)
     drive = problem.signals['drive'] / 6.0
     discrepancy = Discrepancy(np.full((len(drive), 1), SIZE), drive[:, None] / 0.45,
-                              np.zeros((len(drive), 0)), *np.zeros((3, len(drive))),
+                              np.zeros((len(drive), 0)), np.zeros((len(drive), 0)),
                               np.zeros((len(drive), 0)))
     covariance = Covariance(discrepancy, problem.clock, problem.trial, NOISE, np.inf, 0.3)
     covariance.add(covariance.start(0.1, 0.3))

@@ -27,15 +27,16 @@ from model_support import (
 KEPT = 0.8
 
 
-def keeping(*names, kept=KEPT, **changes):
+def keeping(*names, kept=KEPT, cooled=1.0, **changes):
     """Return a model whose strain grows with the load, and is kept, with other effects by name."""
     model = bicep_model(('stress_dependent_strain', *names), **changes)
-    return model.with_effects([*model.effects, effect_of(model, 'formation_memory', kept=kept)])
+    memory = effect_of(model, 'formation_memory', kept=kept, cooled=cooled)
+    return model.with_effects([*model.effects, memory])
 
 
-def balance(*names, kept=KEPT):
+def balance(*names, kept=KEPT, cooled=1.0):
     """Return the arm of that model."""
-    model = keeping(*names, kept=kept)
+    model = keeping(*names, kept=kept, cooled=cooled)
     return model.balance(model.chain())
 
 
@@ -133,6 +134,19 @@ def test_the_angle_is_that_of_brute_force():
         theta = made.step(x, 30.0)
         assert theta == pytest.approx(optimize.brentq(gap, *GEOMETRY.angle_range), abs=2e-6)
         take(theta, x)
+
+
+@pytest.mark.parametrize('names', [(), ('coulomb_friction',)])
+def test_a_wire_that_was_hung_cold_begins_with_the_strain_of_that_load(names):
+    """As without a memory, until it is heated: then it is as it always is."""
+    hung, cooled, plain = (balance(*names, **values) for values in (
+        {'cooled': 0.0}, {}, {'kept': 0.0}))
+    rests = [made.settle(0.5) for made in (hung, cooled, plain)]
+    assert rests[0] == pytest.approx(rests[2], abs=1e-9)
+    assert abs(rests[1] - rests[2]) > 1e-3
+    for x in np.concatenate([np.linspace(0.5, 40.0, 50), np.linspace(40.0, 0.5, 2000)]):
+        angles = [made.step(float(x), 30.0) for made in (hung, cooled)]
+    assert angles[0] == pytest.approx(angles[1], abs=1e-6)
 
 
 @pytest.mark.parametrize('names', [(), ('coulomb_friction',), ('unequal_muscles',)])

@@ -23,7 +23,7 @@ def make(trials, rows, seed=0):
     drive = np.concatenate([np.cumsum(rng.standard_normal(rows)) for _ in range(trials)])
     drive = (drive - drive.min()) / np.ptp(drive)
     discrepancy = Discrepancy(np.full((len(trial), 1), 1e-3), drive[:, None] / 0.45,
-                              np.zeros((len(trial), 0)), *np.zeros((3, len(trial))),
+                              np.zeros((len(trial), 0)), np.zeros((len(trial), 0)),
                               np.zeros((len(trial), 0)))
     covariance = Covariance(discrepancy, 30.0 * np.arange(1.0, len(trial) + 1.0), trial, 1e-4,
                             np.inf, 0.3)

@@ -59,7 +59,7 @@ DIRECTIONAL = 0.5
 # A share of which nothing is known, root mean square: from none to all, each as likely; and what of
 # it may differ from place to place, its standard deviation.
 SHARE, SHARE_SPREAD = 1.0 / math.sqrt(3.0), 1.0 / math.sqrt(12.0)
-# Effects of which no bench tells the share, as `Discrepancy.courses` has them.
+# Effects of which no bench tells the share, as the first `Discrepancy.courses` have them.
 COURSES: tuple[type[Effect], ...] = (FormationMemory, Kinetics)
 # By how much the full drive heats a muscle above the room [K], about.
 FULL_HEAT = 80.0
@@ -87,13 +87,9 @@ class Discrepancy:
         Where each row lies, in units of the length over which errors change.
     common : ndarray, shape (n, q)
         Errors of which each acts in all rows together, by one standard deviation.
-    kept : ndarray, shape (n,)
-        What the response would change by if martensite kept all of its strain. A share of it, from
-        none to all, is an error of all rows together.
-    kinetics : ndarray, shape (n,)
-        The same if all of it followed the kinetics of `Kinetics`.
-    path : ndarray, shape (n,)
-        The same if the present load had acted all along (`LoadHistory.path`).
+    courses : ndarray, shape (n, c)
+        What the response would change by, each with a share from none to all, which is an error of
+        all rows together, see `courses_along`.
     equations : ndarray, shape (n, e)
         The same as `parts`, for the equations of effects.
     """
@@ -101,15 +97,8 @@ class Discrepancy:
     parts: np.ndarray
     places: np.ndarray
     common: np.ndarray
-    kept: np.ndarray
-    kinetics: np.ndarray
-    path: np.ndarray
+    courses: np.ndarray
     equations: np.ndarray
-
-    @property
-    def courses(self) -> np.ndarray:
-        """What has one course, and a share that is not known: (n, 3)."""
-        return np.column_stack([self.kept, self.kinetics, self.path])
 
     @property
     def size(self) -> float:
@@ -125,7 +114,7 @@ class Discrepancy:
 
     def shares(self, residual: np.ndarray, deviation: np.ndarray | float = 1.0) -> np.ndarray:
         """
-        Return the shares (3,) of the `courses`, 0 to 1, that explain most of a residual (n,).
+        Return the shares (c,) of the `courses`, 0 to 1, that explain most of a residual (n,).
 
         In units of a standard deviation (n,) of each row, where it is given.
         """
@@ -355,17 +344,46 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     if room:
         common = np.column_stack([common, room_change(problem, effects)])
     known = {*tried, *(effect.id for effect in effects)}
-    kept, kinetics = (
-        np.zeros(len(predicted)) if kind.id in known or not kind.available(
-            problem.model.surroundings) else course_of(kind, problem, effects)
-        for kind in COURSES)
+    courses = np.column_stack([courses_along(problem, effects, known), history.path])
     return Discrepancy(
         parts, np.column_stack([way_done(drive, predicted, problem.trial), unit(predicted)])
-        / settings.correlation, common,
-        kept, kinetics, history.path, np.zeros((len(predicted), 0)))
+        / settings.correlation, common, courses, np.zeros((len(predicted), 0)))
 
 
-def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+def courses_along(problem: ArmProblem, effects: Sequence[Effect], known: Collection[str]
+                  ) -> np.ndarray:
+    """
+    Return what the response would change by if all of the wire had a property no bench tells.
+
+    Parameters
+    ----------
+    problem : ArmProblem
+        Rows and model.
+    effects : sequence of Effect
+        All effects of the model, which say where the arm goes.
+    known : collection of str
+        Identifiers of effects that speak for themselves.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        If martensite kept all of its strain, that of the load at rest at first; if all followed the
+        kinetics of `Kinetics` (0 for those that are `known`); and what more the first would be if
+        each trial began with what forms on the way down to rest, as it does where the arm has
+        cooled down.
+    """
+    kept, kinetics = (
+        np.zeros(len(problem.measured)) if kind.id in known or not kind.available(
+            problem.model.surroundings) else course_of(kind, problem, effects)
+        for kind in COURSES)
+    at_rest = kept
+    if np.any(kept):
+        at_rest = course_of(FormationMemory, problem, effects, cooled=0.0)
+    return np.column_stack([at_rest, kinetics, kept - at_rest])
+
+
+def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect],
+              **others: float) -> np.ndarray:
     """
     Return what the response would change by if all of the wire did what one of `COURSES` says.
 
@@ -376,13 +394,16 @@ def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect]
         Rows and model.
     effects : sequence of Effect
         All effects of the model, none of this kind among them.
+    **others : float
+        Values of other parameters than the share.
 
     Returns
     -------
     ndarray, shape (n,)
     """
     size = kind.parameters[0]
-    return _change_by(kind(problem.model.surroundings, **{size.name: 1.0}), problem, effects)
+    return _change_by(
+        kind(problem.model.surroundings, **{size.name: 1.0}, **others), problem, effects)
 
 
 def kinetics_spread(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

@@ -10,17 +10,18 @@ can be added.
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, TYPE_CHECKING
-
-import numpy as np
 
 from hysteresis_ros.diagnosis import significance
 from hysteresis_ros.diagnosis.discrepancy import COURSES
+from hysteresis_ros.diagnosis.fitted_sets import rms
 from hysteresis_ros.diagnosis.observable import unaffected
 
 if TYPE_CHECKING:
     from hysteresis_ros.diagnosis.arm_fit import Fit
     from hysteresis_ros.diagnosis.selection import Selection
+    from hysteresis_ros.effects import Effect
 
 
 def not_on_bench(selection: Selection, fit: Fit) -> dict[str, dict[str, Any]]:
@@ -50,12 +51,19 @@ def not_on_bench(selection: Selection, fit: Fit) -> dict[str, dict[str, Any]]:
         size = kind.parameters[0]
         if share < size.low:
             continue
-        response, = problem.simulate_many([[*effects, kind(surroundings, **{size.name: share})]])
-        after = problem.measured - response
+        responses = problem.simulate_many([
+            [*effects, kind(surroundings, **{size.name: share}, **form)] for form in _forms(kind)])
+        after = min((problem.measured - response for response in responses), key=rms)
         gain, _ = significance.gain_interval(before, after, problem.block, selection.rng)
         if gain >= selection.settings.practical:
             found[kind.id] = {'effect': kind.id, size.name: share,
-                              **{name: float(np.sqrt(np.mean(residual ** 2)))
-                                 for name, residual in (('rmse_before', before),
-                                                        ('rmse_after', after))}}
+                              'rmse_before': rms(before), 'rmse_after': rms(after)}
     return found
+
+
+def _forms(kind: type[Effect]) -> list[dict[str, float]]:
+    """Return the values of what is chosen of an effect on an arm, in all combinations."""
+    chosen = [parameter for parameter in kind.parameters
+              if parameter.choices and 'arm' in parameter.kinds]
+    return [dict(zip([one.name for one in chosen], values))
+            for values in itertools.product(*(one.choices for one in chosen))]

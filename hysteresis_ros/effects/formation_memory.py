@@ -16,8 +16,9 @@ class FormationMemory(MaterialEffect):
     down keeps the strain of the raised arm's load. How the strain grows with the load is what
     `stress_dependent_strain` says; where it does not grow, nothing is kept. A part of that growth
     is elastic, because martensite is softer than austenite, and is not kept: a wire that keeps all
-    of its transformation strain shows `kept` from 0.6 to 0.9. Every trial begins with martensite
-    that formed while the arm cooled down.
+    of its transformation strain shows `kept` from 0.6 to 0.9. A trial begins with martensite that
+    formed while the arm cooled down, or that the load at rest has oriented, as where the wire was
+    cold before it was hung.
 
     It is a property of the wire that no bench of constant loads shows, so it is part of the base
     model's own error, and not what an arm lacks that runs as it always did. Who wants to know it
@@ -37,12 +38,20 @@ class FormationMemory(MaterialEffect):
     confused_with = ('stress_dependent_strain', 'backlash')
     parameters = (
         Parameter('kept', '1', 'share of the strain that is kept', 0.1, 1.0, 0.0, (0.4, 0.9),
-                  limits=(0.0, 1.0)),)
+                  limits=(0.0, 1.0)),
+        Parameter('cooled', '1', '1: a trial begins with martensite that formed while the arm '
+                  'cooled down, 0: that the load at rest has oriented', 0.0, 1.0, 1.0, (1.0,),
+                  choices=(1.0, 0.0), kinds=('arm',)))
 
     @property
     def keeps_strain(self) -> float:    # type: ignore[override]
         """Return the share."""
         return self.kept
+
+    @property
+    def cooled_on_arm(self) -> bool:    # type: ignore[override]
+        """Return whether a trial begins with what the way down to rest has left."""
+        return self.cooled == 1.0
 
     @classmethod
     def available(cls, surroundings: Surroundings) -> bool:

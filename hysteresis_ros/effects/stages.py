@@ -82,6 +82,9 @@ class MaterialEffect(Effect):
     follows_strain: float = 0.0
     # Share, 0 to 1, of its strain that martensite keeps from the load under which it formed.
     keeps_strain: float = 0.0
+    # Whether the martensite that a trial begins with formed while the arm cooled down; else under
+    # the load at rest.
+    cooled_on_arm: bool = True
     # Share, 0 to 1, of the transformation whose minor loops are scaled from the major one.
     kinetics: float = 0.0
     # Share, 0 to 1, of what a load has left twinned that each branch of these orients anew.

@@ -147,7 +147,7 @@ def _advance(arm: Arm, state: State, x: float, dt: float, offset: float, factor:
 @inlined
 def _cooling(arm: Arm, state: State, x: float) -> tuple[int, float]:
     """Return in how many samples a hot muscle cools down to the state of rest, and x while hot."""
-    if arm.wires.kept == 0.0:
+    if arm.wires.kept == 0.0 or not arm.wires.cooled:
         return 1, x
     # What forms on the way down remembers the loads that it meets there.
     k, share = place(arm, state.motion, 0, 0.0, 0.0)

@@ -225,6 +225,11 @@ class Chain:
         return min(sum((effect.keeps_strain for effect in self.material), 0.0), 1.0)
 
     @property
+    def cooled_on_arm(self) -> bool:
+        """Whether what a trial begins with formed while the arm cooled down."""
+        return all(effect.cooled_on_arm for effect in self.material)
+
+    @property
     def kinetics(self) -> float:
         """Share, 0 to 1, of the transformation whose minor loops are scaled from the major one."""
         return min(sum((effect.kinetics for effect in self.material), 0.0), 1.0)
