@@ -292,7 +292,8 @@ def test_a_row_that_is_off_by_more_than_heavy_tails_decides():
 def test_what_has_one_course_has_no_size():
     course = np.linspace(-1.0, 1.0, ROWS) ** 3
     covariance = make()
-    covariance.discrepancy = dataclasses.replace(covariance.discrepancy, kept=course)
+    covariance.discrepancy = dataclasses.replace(
+        covariance.discrepancy, courses=course[:, None])
     assert relative(covariance, 0.4 * course) == 0.0
     assert relative(covariance, -0.4 * course) > 1.0
 
