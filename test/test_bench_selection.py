@@ -302,6 +302,19 @@ def test_a_load_predicted_nearly_as_well_is_no_argument_against_an_effect(select
         assert selection._named_again(selection.base) == named
 
 
+@pytest.mark.parametrize('held_out, fitted, helps', [
+    # Weights alone may follow the loads that they are fitted to, and predict no other.
+    ((0.3, 0.3, 0.3, 0.3), 1.1, True), ((0.3, 0.5, 0.2, 0.4), 1.1, True),
+    # One load of four may be predicted better by chance, unless the rows fitted say so, too.
+    ((0.05, 1.0, 1.1, 0.9), 1.1, False), ((0.05, 1.0, 1.1, 0.9), 0.7, True),
+    ((0.97, 0.97, 0.97, 0.97), 0.7, False)])
+def test_a_set_helps_that_surely_predicts_loads_or_most_rows_fitted(
+        selection, held_out, fitted, helps):
+    fold = np.searchsorted(selection.problem.folds, selection.problem.fold)
+    fit = of_share(selection, ('slack',), np.array(held_out)[fold], fitted)
+    assert selection._helps(fit) is helps
+
+
 def test_what_only_some_muscles_have_is_no_rival_of_what_every_loaded_one_has(
         selection, monkeypatch):
     """

@@ -21,6 +21,7 @@ from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import FEWEST_LOADS
 from hysteresis_ros.diagnosis.extend import extended_model
+from hysteresis_ros.diagnosis.forms import with_best_forms
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import located
 from hysteresis_ros.diagnosis.parameters import universal, usual
@@ -117,9 +118,12 @@ def _determined(model: MuscleModel, found: Sequence[Effect], problem: BenchProbl
         without = _extended_without([*excluded, name], model, found, problem)
         rivals = {effect.id: _extended_without([*excluded, effect.id], model, found, problem)
                   for effect in added if effect.id != name}
-        # Two effects may stand for each other, so that of neither the size is determined.
+        # Two effects may stand for each other, so that of neither the size is determined until one
+        # of them goes.
         largest = (1.0 - Settings().practical) * _left_out_rmse(without[0])
-        clear = [other for other, (rival, _) in rivals.items() if _left_out_rmse(rival) < largest]
+        clear = [other for other, (rival, kept) in rivals.items()
+                 if _left_out_rmse(rival) < largest
+                 and all(effect.id != name for effect in _undetermined(kept))]
         if clear:
             name = min(clear, key=lambda other: _left_out_rmse(rivals[other][0]))
             without = rivals[name]
@@ -131,8 +135,13 @@ def _determined(model: MuscleModel, found: Sequence[Effect], problem: BenchProbl
 def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequence[Effect],
                       problem: BenchProblem) -> tuple[MuscleModel, list[Effect]]:
     """Return the model with the effects found and usual but for some, and those effects."""
-    known = _with_universal(
-        model, [effect for effect in found if effect.id not in excluded], problem, excluded)
+    known = [effect for effect in found if effect.id not in excluded]
+    if len(known) < len(found):
+        # What stood for the form of another effect is gone.
+        fitter = BenchFitter(problem.finer())
+        fit = fitter.best_of([known, usual(known, 'bench')])
+        known = with_best_forms(fitter, fitter.with_intervals(fit))
+    known = _with_universal(model, known, problem, excluded)
     known = _in_simpler_terms(BenchFitter(problem.finer()), known, excluded)
     if ThermalExpansion.id not in excluded:
         known = with_expansion(BenchFitter(problem.finer()), known, Settings().practical)

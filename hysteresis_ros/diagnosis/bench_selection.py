@@ -410,11 +410,21 @@ class BenchSelection:
             np.stack([self._gains(fit, base) for fit in fits]), self.rng, self.settings.draws)
 
     def _helps(self, fit: Fit) -> bool:
-        """Whether a fit explains enough of held-out rows to matter, and helps in most blocks."""
-        largest = (1.0 - self.settings.practical) * self.typical_error(self.base)
+        """
+        Whether a fit explains enough of held-out rows to matter, and not by chance.
+
+        It surely predicts loads that are left out better, or helps in most blocks of the rows that
+        are fitted. Weights without effects may follow each load that they are fitted to, and say
+        nothing of any other.
+        """
+        if self.typical_error(fit) > (1.0 - self.settings.practical) * self.typical_error(
+                self.base):
+            return False
         gains = self._gains(fit, self.base)
-        return bool(self.typical_error(fit) <= largest
-                    and np.sum(gains[gains > 0.0]) >= CONSISTENT * np.sum(np.abs(gains)))
+        return (significance.surely_larger(
+            self.problem.squares(self.base.held_out), self.problem.squares(fit.held_out),
+            self.problem.small_error)
+            or bool(np.sum(gains[gains > 0.0]) >= CONSISTENT * np.sum(np.abs(gains))))
 
     def could_be(self, rival: Fit) -> bool:
         """Whether a rival could be the truth although the set found is better."""

@@ -53,7 +53,8 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
 
     def fitted(forms: Forms) -> tuple[np.ndarray, Fit]:
         # Values that suit one form may be where a fit of another one gets stuck.
-        anew = [usual([effect], 'bench')[0] if effect.id in forms else effect for effect in free]
+        anew = [usual([effect], 'bench')[0] if effect.id in forms or effect.implausible()
+                else effect for effect in free]
         fits = [trial.fit([effect.with_values(**forms.get(effect.id, {})) for effect in start])
                 for start in ([free, anew] if forms else [free])]
         fit = trial.cross_validate(min(fits, key=lambda one: trial.error(one.predicted)))
@@ -71,17 +72,22 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
         return bool(other[0][1] <= (1.0 + practical) * than[0][1]
                     and own < (1.0 - practical) * its)
 
+    def vague(fit: Fit) -> set[str]:
+        return {effect.id for effect in trial.with_intervals(fit)
+                if not_determined(effect, trial.problem.kind)}
+
     present = error, _ = fitted({})
     chosen = None
     if simplest:
         plain = fitted(simplest)
-        if not plain[1].implausible() and np.all(plain[0] <= (1.0 + practical) * error):
+        if (not plain[1].implausible() and np.all(plain[0] <= (1.0 + practical) * error)
+                and not better(present, plain)):
             present, chosen = plain, plain[1]
     for forms in others:
         other = fitted({**simplest, **forms} if chosen is not None else forms)
+        # A form must not leave more undetermined than there was.
         if (not other[1].implausible() and better(other, present)
-                and not any(not_determined(effect, trial.problem.kind)
-                            for effect in trial.with_intervals(other[1]))):
+                and vague(other[1]) <= vague(present[1])):
             present, chosen = other, other[1]
     if chosen is None:
         return list(effects)

@@ -119,7 +119,7 @@ class StressDependentStrain(MaterialEffect):
         Parameter('growth', '1', 'growth of the strain with the load against that on the bench',
                   0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',)),
         Parameter('n', '1', 'how late and abruptly it grows: 1 exponential, 2 Gaussian, 4 as from '
-                  'a critical load on', 1.0, 4.0, 1.0, (1.0,), choices=(1.0, 2.0, 4.0),
+                  'a critical load on', 1.0, 4.0, 1.0, (1.0,), choices=(1.0, 1.5, 2.0, 4.0),
                   kinds=('bench',), form=True),
         Parameter('hot', '1', 'with a growth, 0: the cold muscle at rest is as long as on the '
                   'bench, 1: the hot one is', 0.0, 1.0, 0.0, (0.0,), choices=(0.0, 1.0),

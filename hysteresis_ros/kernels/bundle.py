@@ -45,8 +45,8 @@ class Wires(NamedTuple):
     that of H2, at loads `spacing` [N] apart from `lightest` on, as the transformation feels them.
     `oriented` (m,) is the share of what forms that these loads orient, where `orients` says that it
     counts (see `kinetics`). `elastic` says whether the compliance is the wires' own, not a typical
-    one. `kept` is the share of the strain that martensite keeps (see `formation`), and `cooled` says
-    whether what is there at the start formed on the way down to rest.
+    one. `kept` is the share of the strain that martensite keeps (see `formation`), `cooled` whether
+    what is there at the start formed on the way down to rest.
     """
 
     table: np.ndarray
