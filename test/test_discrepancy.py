@@ -50,10 +50,10 @@ def test_what_martensite_may_keep_of_its_load_is_an_error_of_all_rows_together(n
         - problem.simulate([growth])
         for values in ({'kept': 0.5}, {'kept': 1.0}, {'kept': 1.0, 'cooled': 0.0}))
     assert np.std(all_kept) > 1e-3
-    assert found.courses[:, 0] == pytest.approx(at_rest) and found.common.size == 0
+    assert found.courses[:, 0] == pytest.approx(all_kept) and found.common.size == 0
     # What each trial begins with lasts until it is heated.
-    begun = found.courses[:, 2]
-    assert begun == pytest.approx(all_kept - at_rest)
+    assert found.courses[:, 2] == pytest.approx(at_rest)
+    begun = all_kept - at_rest
     firsts = np.searchsorted(problem.trial, np.unique(problem.trial))
     assert 1.01 * np.abs(begun[firsts]).max() > np.abs(begun).max() > 1e-3
     assert found.matrix() - found.matrix(courses=False) == pytest.approx(
@@ -63,7 +63,7 @@ def test_what_martensite_may_keep_of_its_load_is_an_error_of_all_rows_together(n
         problem, [growth], problem.simulate([growth]), Settings(), ['formation_memory'])
     assert found.parts == pytest.approx(known.parts) and not np.any(known.courses[:, [0, 2]])
     assert found.size ** 2 - known.size ** 2 == pytest.approx(
-        np.mean(at_rest ** 2 + begun ** 2) / 3.0)
+        np.mean(all_kept ** 2 + at_rest ** 2) / 3.0)
     assert found.size_besides_courses == known.size_besides_courses
 
 

@@ -74,7 +74,7 @@ def test_what_martensite_keeps_is_no_event(monkeypatch):
     found = selection(model, recording(model, change=step), ())
     for kept, happened in ((2.0 * step, False), (step[::-1] - step, True)):
         monkeypatch.setattr(found.covariance, 'discrepancy', dataclasses.replace(
-            found.covariance.discrepancy, kept=kept))
+            found.covariance.discrepancy, courses=kept[:, None]))
         assert np.isfinite(events.most_probable(found.problem, found)[1]) == happened
 
 

@@ -74,12 +74,12 @@ def test_what_martensite_keeps_is_no_part_of_the_models_own_error(fitter, sets, 
     """Whatever its share, and however large it is; of another course nothing is taken off."""
     course = np.linspace(-1.0, 1.0, len(fitter.problem.measured)) ** 3
     monkeypatch.setattr(fitter.covariance, 'discrepancy', dataclasses.replace(
-        fitter.covariance.discrepancy, kept=course, kinetics=0.0 * course))
+        fitter.covariance.discrepancy, courses=course[:, None]))
     sets.keep(fitted(fitter))
     sets.keep_least(NAMES, fitter.problem.measured - 0.7 * course)
     assert sets.own_error(NAMES) == pytest.approx(0.0, abs=1e-12)
     monkeypatch.setattr(fitter.covariance, 'discrepancy', dataclasses.replace(
-        fitter.covariance.discrepancy, kept=0.0 * course))
+        fitter.covariance.discrepancy, courses=0.0 * course[:, None]))
     other = FittedSets(fitter, Settings(), np.random.default_rng(0))
     other.keep(fitted(fitter))
     assert other.own_error(NAMES) == other.error(NAMES) > 1e-5
@@ -88,7 +88,7 @@ def test_what_martensite_keeps_is_no_part_of_the_models_own_error(fitter, sets, 
 def test_what_martensite_keeps_does_not_raise_what_the_model_may_be_off_by(fitter, monkeypatch):
     without = FittedSets(fitter, Settings(), np.random.default_rng(0)).largest_rmse
     monkeypatch.setattr(fitter.covariance, 'discrepancy', dataclasses.replace(
-        fitter.covariance.discrepancy, kept=np.ones(len(fitter.problem.measured))))
+        fitter.covariance.discrepancy, courses=np.ones((len(fitter.problem.measured), 1))))
     assert FittedSets(fitter, Settings(), np.random.default_rng(0)).largest_rmse == without
 
 

@@ -367,19 +367,18 @@ def courses_along(problem: ArmProblem, effects: Sequence[Effect], known: Collect
     Returns
     -------
     ndarray, shape (n, 3)
-        If martensite kept all of its strain, that of the load at rest at first; if all followed the
-        kinetics of `Kinetics` (0 for those that are `known`); and what more the first would be if
-        each trial began with what forms on the way down to rest, as it does where the arm has
-        cooled down.
+        If martensite kept all of its strain; if all followed the kinetics of `Kinetics`; and if
+        martensite kept all of its strain, but each trial began with what the load at rest orients
+        and not with what forms on the way down to rest. 0 for what is `known`.
     """
     kept, kinetics = (
         np.zeros(len(problem.measured)) if kind.id in known or not kind.available(
             problem.model.surroundings) else course_of(kind, problem, effects)
         for kind in COURSES)
-    at_rest = kept
+    hung_cold = kept
     if np.any(kept):
-        at_rest = course_of(FormationMemory, problem, effects, cooled=0.0)
-    return np.column_stack([at_rest, kinetics, kept - at_rest])
+        hung_cold = course_of(FormationMemory, problem, effects, cooled=0.0)
+    return np.column_stack([kept, kinetics, hung_cold])
 
 
 def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect],

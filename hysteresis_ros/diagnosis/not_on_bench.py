@@ -47,7 +47,8 @@ def not_on_bench(selection: Selection, fit: Fit) -> dict[str, dict[str, Any]]:
     discrepancy = (fit.covariance or selection.covariance).discrepancy
     effects = [*unaffected(selection.fixed, fit.effects), *fit.effects]
     found: dict[str, dict[str, Any]] = {}
-    for kind, share in zip(COURSES, discrepancy.shares(before).tolist()):
+    kept, kinetics, hung_cold, *_ = discrepancy.shares(before).tolist()
+    for kind, share in zip(COURSES, (min(kept + hung_cold, 1.0), kinetics)):
         size = kind.parameters[0]
         if share < size.low:
             continue
