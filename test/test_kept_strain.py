@@ -30,8 +30,10 @@ def diagnosis_of(model, *effects, tried=TRIED, rows=30):
     return diagnose(model, [with_noise(recording, noise)], tried)
 
 
-def test_a_wire_that_keeps_strain_is_no_fault_of_the_arm_but_said(model):
-    found = diagnosis_of(model, effect_of(model, 'formation_memory', kept=0.8))
+@pytest.mark.parametrize('cooled', [1.0, 0.0])
+def test_a_wire_that_keeps_strain_is_no_fault_of_the_arm_but_said(model, cooled):
+    """Whether each trial begins with a wire that has cooled down on the arm, or was hung cold."""
+    found = diagnosis_of(model, effect_of(model, 'formation_memory', kept=0.8, cooled=cooled))
     assert (found.verdict, found.missing) == ('adequate', [])
     kept = found.to_dict()['kept_strain']
     assert kept['effect'] == 'formation_memory'
