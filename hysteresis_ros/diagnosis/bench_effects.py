@@ -116,10 +116,11 @@ def _determined(model: MuscleModel, found: Sequence[Effect], problem: BenchProbl
         # What every loaded muscle has goes last.
         name = min(undetermined, key=lambda effect: effect.universal).id
         without = _extended_without([*excluded, name], model, found, problem)
-        rivals = {effect.id: _extended_without([*excluded, effect.id], model, found, problem)
-                  for effect in added if effect.id != name}
         # Two effects may stand for each other, so that of neither the size is determined until one
         # of them goes.
+        rivals = {effect.id: _extended_without([*excluded, effect.id], model, found, problem)
+                  for effect in added if effect.id != name
+                  and _determined_without(effect, name, added, problem)}
         largest = (1.0 - Settings().practical) * _left_out_rmse(without[0])
         clear = [other for other, (rival, kept) in rivals.items()
                  if _left_out_rmse(rival) < largest
@@ -130,6 +131,17 @@ def _determined(model: MuscleModel, found: Sequence[Effect], problem: BenchProbl
         excluded.append(name)
         extended, added = without
     return extended, added
+
+
+def _determined_without(other: Effect, name: str, effects: Sequence[Effect],
+                        problem: BenchProblem) -> bool:
+    """Whether the rows determine an effect of some, by name, once another one of them is gone."""
+    fitter = BenchFitter(problem.finer())
+    rest = [effect for effect in effects if effect is not other]
+    fitter.fixed = [effect for effect in rest if isinstance(effect, Kinetics)]
+    fit = fitter.fit([effect for effect in rest if effect not in fitter.fixed])
+    found = [*fitter.with_intervals(fit), *fitter.fixed]
+    return all(effect.id != name for effect in _undetermined(found))
 
 
 def _extended_without(excluded: Collection[str], model: MuscleModel, found: Sequence[Effect],
