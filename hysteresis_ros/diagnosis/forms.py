@@ -77,18 +77,23 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
                 if not_determined(effect, trial.problem.kind)}
 
     present = error, _ = fitted({})
+    kept: Forms = {}
     chosen = None
     if simplest:
         plain = fitted(simplest)
         if (not plain[1].implausible() and np.all(plain[0] <= (1.0 + practical) * error)
                 and not better(present, plain)):
-            present, chosen = plain, plain[1]
-    for forms in others:
-        other = fitted({**simplest, **forms} if chosen is not None else forms)
-        # A form must not leave more undetermined than there was.
-        if (not other[1].implausible() and better(other, present)
-                and vague(other[1]) <= vague(present[1])):
-            present, chosen = other, other[1]
+            present, chosen, kept = plain, plain[1], simplest
+    tried = [fitted({**kept, **forms}) for forms in others]
+    # One that leaves nothing undetermined, or else no more than there was.
+    for most in (set(), vague(present[1])):
+        for other in tried:
+            if (not other[1].implausible() and better(other, present)
+                    and vague(other[1]) <= most):
+                present = other
+        if any(present is other for other in tried):
+            chosen = present[1]
+            break
     if chosen is None:
         return list(effects)
     found = {effect.id: effect for effect in (*effects, *trial.with_intervals(chosen))}
