@@ -89,7 +89,10 @@ class Discrepancy:
         Errors of which each acts in all rows together, by one standard deviation.
     courses : ndarray, shape (n, c)
         What the response would change by, each with a share from none to all, which is an error of
-        all rows together, see `courses_along`.
+        all rows together. On an arm: if martensite kept all of its strain; if all of it followed
+        the kinetics of `Kinetics`; if martensite kept all of its strain, but each trial began with
+        what the load at rest orients and not with what forms on the way down to rest; and if the
+        present load had acted all along (`LoadHistory.path`).
     equations : ndarray, shape (n, e)
         The same as `parts`, for the equations of effects.
     """
@@ -344,33 +347,15 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     if room:
         common = np.column_stack([common, room_change(problem, effects)])
     known = {*tried, *(effect.id for effect in effects)}
-    courses = np.column_stack([courses_along(problem, effects, known), history.path])
+    courses = np.column_stack([_courses_along(problem, effects, known), history.path])
     return Discrepancy(
         parts, np.column_stack([way_done(drive, predicted, problem.trial), unit(predicted)])
         / settings.correlation, common, courses, np.zeros((len(predicted), 0)))
 
 
-def courses_along(problem: ArmProblem, effects: Sequence[Effect], known: Collection[str]
-                  ) -> np.ndarray:
-    """
-    Return what the response would change by if all of the wire had a property no bench tells.
-
-    Parameters
-    ----------
-    problem : ArmProblem
-        Rows and model.
-    effects : sequence of Effect
-        All effects of the model, which say where the arm goes.
-    known : collection of str
-        Identifiers of effects that speak for themselves.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        If martensite kept all of its strain; if all followed the kinetics of `Kinetics`; and if
-        martensite kept all of its strain, but each trial began with what the load at rest orients
-        and not with what forms on the way down to rest. 0 for what is `known`.
-    """
+def _courses_along(problem: ArmProblem, effects: Sequence[Effect], known: Collection[str]
+                   ) -> np.ndarray:
+    """Return the `courses` but for the last one, shape (n, 3); 0 for effects that are `known`."""
     kept, kinetics = (
         np.zeros(len(problem.measured)) if kind.id in known or not kind.available(
             problem.model.surroundings) else course_of(kind, problem, effects)

@@ -101,7 +101,8 @@ class StressDependentStrain(MaterialEffect):
                 'load; on the arm alone: + growth (1 - s(F)) above the line, from no load where r '
                 'is known, else from Fm; the cold muscle at rest keeps its length, or the hot one')
     source = ('orientation of martensite variants under stress: exponential (n = 1) as H_cur of '
-              'Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155, Gaussian (n = 2), or from '
+              'Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155, Gaussian (n = 2), between '
+              'the two as where the strain grows from no load on (n = 1.5), or from '
               'a critical stress on (larger n) as of Brinson, J. Intell. Mater. Syst. Struct. 4 '
               '(1993) 229')
     shows_in = 'load, cold side'

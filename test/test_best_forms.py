@@ -1,0 +1,55 @@
+# Copyright 2026 hysteresis_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which form of its equation an effect of a bench gets, by what each leaves of the rows."""
+
+import types
+
+from model_support import bicep_model, effect_of
+import pytest
+
+from hysteresis_ros.diagnosis import forms
+
+FAR = 9.0, 9.0
+
+
+@pytest.mark.parametrize('present, errors, vague, chosen', [
+    # Loads held out do not tell the two apart: rows fitted do, or else the simplest form is taken.
+    (2.0, {1.0: (1.4, 1.0), 2.0: (0.4, 1.0)}, (), 2.0),
+    (2.0, {1.0: (0.41, 1.0), 2.0: (0.4, 1.0)}, (), 1.0),
+    (2.0, {1.0: (0.41, 1.2), 2.0: (0.4, 1.0)}, (), 2.0),
+    # A form that leaves nothing undetermined comes first, whatever another one gains.
+    (1.0, {1.0: (1.4, 1.0), 1.5: (0.4, 0.8), 4.0: (0.6, 0.9)}, (1.0, 1.5), 4.0),
+    # Where there is none, one that leaves no more than there was.
+    (1.0, {1.0: (1.4, 1.0), 1.5: (0.4, 0.8)}, (1.0, 1.5), 1.5),
+    (1.0, {1.0: (1.4, 1.0), 1.5: (0.4, 0.8)}, (1.5,), 1.0)])
+def test_the_form_is_that_which_fitted_and_held_out_rows_ask_for(
+        monkeypatch, present, errors, vague, chosen):
+    """Errors of rows fitted and held out, by the form n."""
+    class Fitter:
+        """Each form has its errors, whatever the values."""
+
+        fixed = ()
+
+        def __init__(self, problem):
+            self.problem = problem
+
+        def fit(self, effects):
+            fitted, held_out = errors.get(effects[0].n, FAR)
+            return types.SimpleNamespace(effects=effects, predicted=fitted, held_out=held_out,
+                                         implausible=list)
+
+        def cross_validate(self, fit):
+            return fit
+
+        def error(self, error):
+            return error
+
+        def with_intervals(self, fit):
+            return fit.effects
+
+    monkeypatch.setattr(forms, 'BenchFitter', Fitter)
+    monkeypatch.setattr(forms, 'not_determined', lambda effect, kind: effect.n in vague)
+    problem = types.SimpleNamespace(kind='bench', typical_error=float)
+    growth = effect_of(bicep_model(), 'stress_dependent_strain', r=0.6, n=present)
+    found, = forms.with_best_forms(Fitter(problem), [growth])
+    assert found.n == chosen
