@@ -73,15 +73,15 @@ def test_it_is_not_added_where_anything_speaks_against_it(usual, monkeypatch):
     known = usual.effects
     assert with_overlooked(fitter, known, (), 1.0) == known
     with monkeypatch.context() as patch:
-        patch.setattr(bench_overlooked, 'not_determined', lambda *args: 'not at all')
+        patch.setattr(bench_overlooked, 'undetermined_names', lambda *args: {'all'})
         assert not added(usual, own)
     monkeypatch.setattr(Fit, 'implausible', lambda self: ['transformation_slopes.g'])
     assert not added(usual, own)
 
 
 def test_what_rows_do_not_determine_stays_as_loads_left_out_have_it(usual, monkeypatch):
-    monkeypatch.setattr(bench_overlooked, 'not_determined', lambda effect, kind: (
-        'not by these rows' if effect.id == 'stress_dependent_strain' else None))
+    monkeypatch.setattr(bench_overlooked, 'undetermined_names', lambda effects, kind: {
+        effect.id for effect in effects if effect.id == 'stress_dependent_strain'})
     found = with_overlooked(
         fitter_of(usual, made_with(usual, slopes(usual))), usual.effects, (), PRACTICAL)
     kept, = (effect for effect in usual.effects if effect.id == 'stress_dependent_strain')

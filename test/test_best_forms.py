@@ -28,10 +28,11 @@ def test_the_form_is_that_which_fitted_and_held_out_rows_ask_for(
     class Fitter:
         """Each form has its errors, whatever the values."""
 
-        fixed = ()
-
         def __init__(self, problem):
             self.problem = problem
+
+        def holding(self, effects):
+            return self
 
         def fit(self, effects):
             fitted, held_out = errors.get(effects[0].n, FAR)
@@ -47,8 +48,8 @@ def test_the_form_is_that_which_fitted_and_held_out_rows_ask_for(
         def with_intervals(self, fit):
             return fit.effects
 
-    monkeypatch.setattr(forms, 'BenchFitter', Fitter)
-    monkeypatch.setattr(forms, 'not_determined', lambda effect, kind: effect.n in vague)
+    monkeypatch.setattr(forms, 'undetermined_names', lambda effects, kind: {
+        effect.id for effect in effects if effect.n in vague})
     problem = types.SimpleNamespace(kind='bench', typical_error=float)
     growth = effect_of(bicep_model(), 'stress_dependent_strain', r=0.6, n=present)
     found, = forms.with_best_forms(Fitter(problem), [growth])

@@ -136,11 +136,8 @@ def _determined(model: MuscleModel, found: Sequence[Effect], problem: BenchProbl
 def _determined_without(other: Effect, name: str, effects: Sequence[Effect],
                         problem: BenchProblem) -> bool:
     """Whether the rows determine an effect of some, by name, once another one of them is gone."""
-    fitter = BenchFitter(problem.finer())
-    rest = [effect for effect in effects if effect is not other]
-    fitter.fixed = [effect for effect in rest if isinstance(effect, Kinetics)]
-    fit = fitter.fit([effect for effect in rest if effect not in fitter.fixed])
-    found = [*fitter.with_intervals(fit), *fitter.fixed]
+    _, found = BenchFitter(problem.finer()).fit_but_kinetics(
+        [effect for effect in effects if effect is not other])
     return all(effect.id != name for effect in _undetermined(found))
 
 

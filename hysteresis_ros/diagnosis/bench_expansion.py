@@ -55,8 +55,7 @@ def with_expansion(fitter: BenchFitter, known: Sequence[Effect], practical: floa
         return list(known)
     with np.errstate(all='ignore'):
         before = fitter.fit(known)
-        alone = fitter.apart()
-        alone.fixed = [*fitter.fixed, *before.effects]
+        alone = fitter.apart().holding(before.effects)
         expansion = min((alone.fit([start]) for start in starts_of(
             ThermalExpansion(surroundings), 'bench')), key=lambda fit: fitter.error(fit.predicted))
         effects = [*before.effects, *expansion.effects]

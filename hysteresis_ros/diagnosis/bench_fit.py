@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import copy
 import dataclasses
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ from hysteresis_ros.diagnosis.arm_fit import DIFFERENCE, Fit
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
 from hysteresis_ros.effects import Effect
+from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.identification.gauss_newton import minimise
 
 if TYPE_CHECKING:
@@ -164,6 +165,20 @@ class BenchFitter:
     def apart(self) -> BenchFitter:
         """Return the same, from whose fits this one does not learn where to begin others."""
         return self.on(self.problem.apart())
+
+    def holding(self, effects: Iterable[Effect]) -> BenchFitter:
+        """Return the same with more effects that stay as they are."""
+        other = copy.copy(self)
+        other.fixed = [*self.fixed, *effects]
+        return other
+
+    def fit_but_kinetics(self, effects: Sequence[Effect]) -> tuple[Fit, list[Effect]]:
+        """Return the fit of effects beside their kinetics, and all in order, with intervals."""
+        kinetics = [effect for effect in effects if isinstance(effect, Kinetics)]
+        fitter = self.holding(kinetics)
+        fit = fitter.fit([effect for effect in effects if effect not in kinetics])
+        found = {effect.id: effect for effect in (*fitter.with_intervals(fit), *kinetics)}
+        return fit, [found[effect.id] for effect in effects]
 
     def fit(self, effects: Sequence[Effect], evaluations: int = MOST_EVALUATIONS,
             tolerance: float = TOLERANCE) -> Fit:

@@ -21,7 +21,7 @@ from scipy import special
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
-from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.determined import undetermined_names
 from hysteresis_ros.diagnosis.forms import other_forms, simplest_forms
 from hysteresis_ros.diagnosis.parameters import universal
 from hysteresis_ros.diagnosis.significance import (
@@ -204,15 +204,14 @@ class _Profile:
         fit = self.fits[self.best]
         effects = own.with_intervals(fit)
         # What loads held out have determined is not refitted to rows that do not determine it.
-        vague = [one for one in self._found if any(
-            fitted.id == one.id and not_determined(fitted, problem.kind) for fitted in effects)]
+        names = undetermined_names(effects, problem.kind)
+        vague = [one for one in self._found if one.id in names]
+        names = {effect.id for effect in vague}
         if vague:
-            own.fixed = [*own.fixed, *vague]
-            fit = own.fit([one for one in fit.effects
-                           if one.id not in {effect.id for effect in vague}])
+            own = own.holding(vague)
+            fit = own.fit([one for one in fit.effects if one.id not in names])
             effects = own.with_intervals(fit)
-        if fit.implausible() or any(not_determined(effect, problem.kind)
-                                    for effect in (*effects, kinetics)):
+        if fit.implausible() or undetermined_names((*effects, kinetics), problem.kind):
             return None
         return BenchKinetics([*vague, *effects, kinetics], self.errors[0.0],
                              self.errors[self.best])
@@ -224,10 +223,7 @@ class _Profile:
 
     def fitter_with(self, share: float) -> BenchFitter:
         """Return the fitter with kinetics of a share."""
-        own = self._fitter.apart()
-        if share:
-            own.fixed = [*own.fixed, self.kinetics_of(share)]
-        return own
+        return self._fitter.apart().holding([self.kinetics_of(share)] if share else [])
 
     def evaluate(self, shares: Sequence[float]) -> None:
         """Fit the effects with some shares, but for those that were."""

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
-from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.determined import undetermined_names
 from hysteresis_ros.diagnosis.observable import observable, present
 from hysteresis_ros.diagnosis.significance import independent_rows, schwarz_log_odds
 from hysteresis_ros.effects import catalogue, Effect
@@ -74,16 +74,14 @@ class _OneMore:
     def __init__(self, fitter: BenchFitter, known: Sequence[Effect], excluded: Collection[str]
                  ) -> None:
         problem = fitter.problem
-        self._fitter = fitter.apart()
-        kinetics = [effect for effect in known if isinstance(effect, Kinetics)]
-        self._fitter.fixed = [*fitter.fixed, *kinetics]
-        others = [effect for effect in known if effect not in kinetics]
-        fitted = self._fitter.with_intervals(self._fitter.fit(others))
+        apart = fitter.apart()
+        _, fitted = apart.fit_but_kinetics(known)
         # What loads held out have determined is not refitted to rows that do not determine it.
-        vague = {effect.id for effect in fitted if not_determined(effect, problem.kind)}
-        self._fixed = [*(effect for effect in others if effect.id in vague), *kinetics]
-        self._fitter.fixed = [*fitter.fixed, *self._fixed]
-        self._base = self._fitter.fit([effect for effect in fitted if effect.id not in vague])
+        kept = undetermined_names(fitted, problem.kind).union(
+            effect.id for effect in known if isinstance(effect, Kinetics))
+        self._fixed = [effect for effect in known if effect.id in kept]
+        self._fitter = apart.holding(self._fixed)
+        self._base = self._fitter.fit([effect for effect in fitted if effect.id not in kept])
         self._rows = independent_rows(
             problem.measured - self._base.predicted, problem.trial,
             len(np.unique(problem.block)))
@@ -99,8 +97,8 @@ class _OneMore:
         for odds, fit in sorted(tried, key=lambda one: -one[0]):
             if odds > least and not fit.implausible():
                 effects = self._fitter.with_intervals(fit)
-                if (not any(not_determined(effect, self._fitter.problem.kind)
-                            for effect in effects) and self._confirmed(fit, practical)):
+                if (not undetermined_names(effects, self._fitter.problem.kind)
+                        and self._confirmed(fit, practical)):
                     return [*self._fixed, *effects]
         return None
 

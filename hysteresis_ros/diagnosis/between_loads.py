@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_problem import SAME_LOAD
-from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.determined import undetermined_names
 from hysteresis_ros.diagnosis.forms import simplest_forms
 from hysteresis_ros.diagnosis.significance import typical_error
 from hysteresis_ros.workers import map_in_forks
@@ -62,7 +62,7 @@ def best_between_loads(fitter: BenchFitter, effects: Sequence[Effect], practical
                     or own.problem.typical_error(fit.predicted) > largest_fitted):
                 return np.inf, []
             found = own.with_intervals(fit)
-            if any(not_determined(one, own.problem.kind) for one in found):
+            if undetermined_names(found, own.problem.kind):
                 return np.inf, []
             return _error_between(own, own.cross_validate(fit)), found
 

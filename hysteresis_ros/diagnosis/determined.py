@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 import math
 
 from hysteresis_ros.effects import Effect
@@ -47,3 +48,8 @@ def not_determined(effect: Effect, kind: str) -> str | None:
     if small:
         return f'the interval of {effect.id}.{size.name} contains a value too small to matter'
     return None
+
+
+def undetermined_names(effects: Iterable[Effect], kind: str) -> set[str]:
+    """Return the identifiers of fitted effects whose sizes recordings do not determine."""
+    return {effect.id for effect in effects if not_determined(effect, kind)}

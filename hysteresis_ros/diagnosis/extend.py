@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
-from hysteresis_ros.diagnosis.determined import not_determined, undetermined
+from hysteresis_ros.diagnosis.determined import not_determined, undetermined, undetermined_names
 from hysteresis_ros.diagnosis.forms import with_best_forms
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import can_be_located
@@ -284,8 +284,7 @@ def _fitted_together(problem: BenchProblem, model: MuscleModel, classes: Sequenc
     if fixed:
         added = with_best_forms(fitter, known, fixed)
         # A form that rows do not determine says less than one that they do.
-        vague = {effect.id for effect in added if not_determined(effect, kind)}
-        vague -= {effect.id for effect in known if not_determined(effect, kind)}
+        vague = undetermined_names(added, kind) - undetermined_names(known, kind)
         return with_best_forms(fitter, known, fixed | vague) if vague else added
     added = with_best_forms(fitter, _on_bench(problem, model, classes)[-1][0])
     if not known:
@@ -304,13 +303,8 @@ def _balanced(problem: BenchProblem, added: list[Effect]) -> list[Effect]:
     """Return effects of a bench fitted to rows of unequal weight; as they are if these are not."""
     if np.ptp(problem.emphasis) == 0.0:
         return added
-    fitter = BenchFitter(problem.finer())
-    fitter.fixed = [effect for effect in added if isinstance(effect, Kinetics)]
-    fit = fitter.fit([effect for effect in added if effect not in fitter.fixed])
-    if fit.implausible():
-        return added
-    found = {effect.id: effect for effect in (*fitter.with_intervals(fit), *fitter.fixed)}
-    return [found[effect.id] for effect in added]
+    fit, found = BenchFitter(problem.finer()).fit_but_kinetics(added)
+    return added if fit.implausible() else found
 
 
 def _unobservable(model: MuscleModel, names: Sequence[str], train: Sequence[Measurement],

@@ -10,12 +10,13 @@ always prefer it free. What counts is a load that the fit has not seen.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+import functools
 
 import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
-from hysteresis_ros.diagnosis.determined import not_determined
+from hysteresis_ros.diagnosis.determined import undetermined_names
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import Effect
@@ -47,57 +48,93 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
     simplest, others = simplest_forms(free), other_forms(free)
     if not simplest and not others:
         return list(effects)
-    trial = BenchFitter(fitter.problem)
-    trial.fixed = [*fitter.fixed, *(effect for effect in effects if effect.id in fixed)]
-    practical = Settings().practical
+    own = fitter.holding([effect for effect in effects if effect.id in fixed])
+    first = best = _fitted(own, free, {})
+    kept: Forms = {}
+    if simplest:
+        plain = _fitted(own, free, simplest)
+        if plain.plausible and plain.no_worse(best) and not best.better(plain):
+            best, kept = plain, simplest
+    tried = [_fitted(own, free, {**kept, **forms}) for forms in others]
+    start = best
+    # One that leaves nothing undetermined, or else no more than there was.
+    for most in (set(), start.undetermined):
+        for other in tried:
+            if other.plausible and other.better(best) and other.undetermined <= most:
+                best = other
+        if best is not start:
+            break
+    if best is first:
+        return list(effects)
+    found = {effect.id: effect for effect in (*effects, *best.effects)}
+    return [found[effect.id] for effect in effects]
 
-    def fitted(forms: Forms) -> tuple[np.ndarray, Fit]:
-        # Values that suit one form may be where a fit of another one gets stuck.
-        anew = [usual([effect], 'bench')[0] if effect.id in forms or effect.implausible()
-                else effect for effect in free]
-        fits = [trial.fit([effect.with_values(**forms.get(effect.id, {})) for effect in start])
-                for start in ([free, anew] if forms else [free])]
-        fit = trial.cross_validate(min(fits, key=lambda one: trial.error(one.predicted)))
+
+class _Trial:
+    """
+    One fit of effects in some forms, and how it compares.
+
+    Parameters
+    ----------
+    fitter : BenchFitter
+        That it was fitted by.
+    fit : Fit
+        With held-out rows.
+    """
+
+    def __init__(self, fitter: BenchFitter, fit: Fit) -> None:
+        self._fitter, self._fit = fitter, fit
+        self._fitted = fitter.error(fit.predicted)
         # To the error of all rows the least load contributes most, as the others are extrapolated
         # to it; to the typical one, by which sets are compared, all contribute alike.
-        return np.array([trial.error(fit.held_out),
-                         trial.problem.typical_error(fit.held_out)]), fit
+        self._held_out = np.array([fitter.error(fit.held_out),
+                                   fitter.problem.typical_error(fit.held_out)])
+        self._practical = Settings().practical
 
-    def better(other: tuple[np.ndarray, Fit], than: tuple[np.ndarray, Fit]) -> bool:
-        # As of sets: where rows held out tell two forms apart by less than what matters, the rows
-        # fitted do.
-        if np.all(other[0] < (1.0 - practical) * than[0]):
+    @property
+    def plausible(self) -> bool:
+        """Whether all parameters lie in their physical ranges."""
+        return not self._fit.implausible()
+
+    @functools.cached_property
+    def effects(self) -> list[Effect]:
+        """Those that were free, with intervals."""
+        return self._fitter.with_intervals(self._fit)
+
+    @property
+    def undetermined(self) -> set[str]:
+        """Effects whose sizes the rows do not determine."""
+        return undetermined_names(self.effects, self._fitter.problem.kind)
+
+    def no_worse(self, than: _Trial) -> bool:
+        """Whether held-out rows are predicted as well, by less than what matters."""
+        return bool(np.all(self._held_out <= (1.0 + self._practical) * than._held_out))
+
+    def better(self, than: _Trial) -> bool:
+        """
+        Whether rows tell this form from another one.
+
+        As of sets: where those held out tell the two apart by less than what matters, those fitted
+        do.
+        """
+        less = 1.0 - self._practical
+        if np.all(self._held_out < less * than._held_out):
             return True
-        own, its = (trial.error(fit.predicted) for _, fit in (other, than))
-        return bool(other[0][1] <= (1.0 + practical) * than[0][1]
-                    and own < (1.0 - practical) * its)
+        return bool(self._held_out[1] <= (1.0 + self._practical) * than._held_out[1]
+                    and self._fitted < less * than._fitted)
 
-    def vague(fit: Fit) -> set[str]:
-        return {effect.id for effect in trial.with_intervals(fit)
-                if not_determined(effect, trial.problem.kind)}
 
-    present = error, _ = fitted({})
-    kept: Forms = {}
-    chosen = None
-    if simplest:
-        plain = fitted(simplest)
-        if (not plain[1].implausible() and np.all(plain[0] <= (1.0 + practical) * error)
-                and not better(present, plain)):
-            present, chosen, kept = plain, plain[1], simplest
-    tried = [fitted({**kept, **forms}) for forms in others]
-    # One that leaves nothing undetermined, or else no more than there was.
-    for most in (set(), vague(present[1])):
-        for other in tried:
-            if (not other[1].implausible() and better(other, present)
-                    and vague(other[1]) <= most):
-                present = other
-        if any(present is other for other in tried):
-            chosen = present[1]
-            break
-    if chosen is None:
-        return list(effects)
-    found = {effect.id: effect for effect in (*effects, *trial.with_intervals(chosen))}
-    return [found[effect.id] for effect in effects]
+def _fitted(fitter: BenchFitter, effects: Sequence[Effect], forms: Forms) -> _Trial:
+    """Return the better of a fit from the present values and one from the usual ones."""
+    starts = [effects]
+    if forms:
+        # Values that suit one form may be where a fit of another one gets stuck.
+        starts.append([usual([effect], 'bench')[0] if effect.id in forms or effect.implausible()
+                       else effect for effect in effects])
+    fits = [fitter.fit([effect.with_values(**forms.get(effect.id, {})) for effect in start])
+            for start in starts]
+    best = min(fits, key=lambda one: fitter.error(one.predicted))
+    return _Trial(fitter, fitter.cross_validate(best))
 
 
 def simplest_forms(effects: Sequence[Effect]) -> Forms:

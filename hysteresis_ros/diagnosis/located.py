@@ -64,9 +64,7 @@ def located(fitter: BenchFitter, known: Sequence[Effect], effect: Effect
     name = free[0].name
 
     def fitter_at(value: float) -> BenchFitter:
-        other = fitter.apart()
-        other.fixed = [*fitter.fixed, effect.with_values(**{name: value})]
-        return other
+        return fitter.apart().holding([effect.with_values(**{name: value})])
 
     def error_at(value: float) -> float:
         other = fitter_at(value)
