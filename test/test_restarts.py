@@ -85,6 +85,7 @@ def test_a_search_begins_at_other_shifts(search, monkeypatch):
     monkeypatch.setattr(own, '_begun_where_larger_ended', lambda fits: [fit])
     monkeypatch.setattr(own, '_in_other_forms', list)
     monkeypatch.setattr(own, '_in_simplest_forms', lambda fits: [])
+    monkeypatch.setattr(own, '_together', lambda: [])
     for fits in own.run():
         assert [one.effects[0].C for one in fits] == [0.38]
 

@@ -82,7 +82,9 @@ class Response:
         Rows within a block are not independent: a block weighs as much as one standard deviation.
         """
         mean, spread = self.parameters.prior()
-        chosen = np.flatnonzero([one.one_sided for _, one in self.parameters.entries])
+        # Rows that are left out may be the only ones that tell a parameter.
+        chosen = np.flatnonzero([one.one_sided or self.rows is not None
+                                 for _, one in self.parameters.entries])
         pull = np.zeros((len(chosen), len(mean)))
         if len(chosen):
             error = (self.predicted(start) - self.problem.measured)[self._fitted] / self._scale

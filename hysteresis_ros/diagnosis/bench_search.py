@@ -21,6 +21,7 @@ from hysteresis_ros.diagnosis.forms import other_forms, simplest_forms
 from hysteresis_ros.diagnosis.observable import present
 from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.restarts import at_other_shifts
+from hysteresis_ros.diagnosis.whole_sets import starts_together, subsets
 from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.workers import delayed, in_parallel, map_in_forks, must_be_sent
 
@@ -69,13 +70,14 @@ class BenchSearch:
         fits : list of Fit
             All single effects, and larger sets.
         variants : list of Fit
-            The best of each size again, in other forms of its effects' equations, and sets in the
-            simplest ones.
+            The best of each size again, in other forms of its effects' equations, sets in the
+            simplest ones, and what every loaded muscle has, fitted together.
         """
         fits = self._begun_where_larger_ended(
             self._in_parallel(_refitted, self.fitter, [fit.effects for fit in self._grown()]))
         fits = self._begun_at_other_shifts(fits)
-        return fits, [*self._in_other_forms(fits), *self._in_simplest_forms(fits)]
+        return fits, [*self._in_other_forms(fits), *self._in_simplest_forms(fits),
+                      *self._together()]
 
     def cross_validated(self, fits: Sequence[Fit]) -> list[Fit]:
         """Return fits with their held-out rows, without those that predict none."""
@@ -215,6 +217,20 @@ class BenchSearch:
                              for effect in fit.effects])
         return self._in_parallel(_fitted, self.fitter, sets)
 
+    def _together(self) -> list[Fit]:
+        """
+        Return fits of all that a loaded muscle has, and of parts of it from where that ended.
+
+        See `whole_sets`.
+        """
+        problem = self.fitter.problem
+        begun = self._in_parallel(_begun_at_best, self.fitter, starts_together(
+            problem.model.surroundings, self._names))
+        if not begun:
+            return []
+        whole = min(begun, key=lambda fit: self.fitter.error(fit.predicted))
+        return self._in_parallel(_fitted, self.fitter, subsets(whole.effects))
+
     def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None], fitter: BenchFitter,
                      items: Sequence) -> list[Fit]:
         results: Iterable[Fit | None]
@@ -279,6 +295,12 @@ def _begun(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
     with np.errstate(all='ignore'):
         return _finite(fitter.begin([
             usual(effects, kind), effects, [*effects[:-1], *usual(effects[-1:], kind)]]))
+
+
+def _begun_at_best(fitter: BenchFitter, starts: Sequence[Sequence[Effect]]) -> Fit | None:
+    """Begin to fit effects from the best of many starts."""
+    with np.errstate(all='ignore'):
+        return _finite(fitter.begin(starts))
 
 
 def _fitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
