@@ -48,11 +48,14 @@ class Response:
         Effects with the parameters that are fitted.
     rows : ndarray of bool, shape (n,), optional
         Rows that weights and parameters are fitted to; all by default.
+    informed : bool
+        Whether all parameters are known beforehand to be plausible, and not only those that are
+        one-sided: rows that are left out may be the only ones that tell a parameter.
     """
 
     def __init__(self, problem: BenchProblem, fixed: Sequence[Effect], effects: Sequence[Effect],
-                 rows: np.ndarray | None = None) -> None:
-        self.problem, self.rows = problem, rows
+                 rows: np.ndarray | None = None, informed: bool = False) -> None:
+        self.problem, self.rows, self._informed = problem, rows, informed
         self.parameters = ParameterVector(effects, problem.kind)
         self._fixed = unaffected(fixed, effects)
         self._fitted: slice | np.ndarray = slice(None) if rows is None else rows
@@ -82,8 +85,7 @@ class Response:
         Rows within a block are not independent: a block weighs as much as one standard deviation.
         """
         mean, spread = self.parameters.prior()
-        # Rows that are left out may be the only ones that tell a parameter.
-        chosen = np.flatnonzero([one.one_sided or self.rows is not None
+        chosen = np.flatnonzero([self._informed or one.one_sided
                                  for _, one in self.parameters.entries])
         pull = np.zeros((len(chosen), len(mean)))
         if len(chosen):
@@ -271,7 +273,7 @@ class BenchFitter:
         problem.begin_near(fit.passive)
         for fold in problem.folds:
             test = problem.fold == fold
-            response = Response(problem, self.fixed, fit.effects, ~test)
+            response = Response(problem, self.fixed, fit.effects, ~test, informed=True)
             vector = response.minimise(fit.vector, HELD_OUT_EVALUATIONS, TOLERANCE)
             held_out[test] = response.predicted(vector)[test]
         return dataclasses.replace(fit, held_out=held_out)

@@ -48,7 +48,7 @@ def with_replicates(model: MuscleModel, problem: BenchProblem, by_hand: bool = F
         effects = model.effects
         balanced = problem.balanced(effects, ~left_out)
         if not by_hand:
-            response = Response(balanced.finer(), [], effects, ~left_out)
+            response = Response(balanced.finer(), [], effects, ~left_out, informed=True)
             effects = response.parameters.with_vector(response.minimise(
                 response.parameters.vector(), MOST_EVALUATIONS, TOLERANCE))
         return Replicate(balanced.stage(effects, levels, ~left_out), effects)
