@@ -65,6 +65,16 @@ def test_kinetics_stay_with_what_is_found(usual):
         {'share': (0.7, 0.9)}]
 
 
+def test_a_fit_beside_kinetics_leaves_them_as_they_are(usual):
+    kinetics = effect_of(usual, 'kinetics', share=0.3)
+    fitter = fitter_of(usual, made_with(usual))
+    fit, found = fitter.fit_but_kinetics([kinetics, *usual.effects])
+    assert found[0] is kinetics and fit.names == tuple(sorted(one.id for one in usual.effects))
+    assert [one.id for one in found[1:]] == [one.id for one in usual.effects]
+    assert all(one.intervals for one in found[1:])
+    assert fitter.fixed == []
+
+
 def test_it_is_not_added_where_anything_speaks_against_it(usual, monkeypatch):
     own = slopes(usual)
     assert 'transformation_slopes' not in added(usual, own, excluded=['transformation_slopes'])
