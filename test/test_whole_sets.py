@@ -47,6 +47,8 @@ def test_starts_are_all_of_each_form(wire):
                  {1.0}, {1.5}, {2.0}, {4.0}]
     for starts in forms:
         assert all({effect.id for effect in start} == set(NAMES) for start in starts)
+        assert all(effect.follows == 0.0 for start in starts for effect in start
+                   if effect.id == 'stress_dependence')
         values = {(effects['stress_dependence'].C, effects['stress_dependent_strain'].F0,
                    effects['transformation_slopes'].g) for effects in (
                        {effect.id: effect for effect in start} for start in starts)}

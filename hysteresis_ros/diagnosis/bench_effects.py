@@ -225,18 +225,9 @@ def _with_universal(model: MuscleModel, found: Sequence[Effect], problem: BenchP
     # Alone they have to help; together with one that was found they only must not harm.
     largest = held_out(fitter.fit(found)) * ((1.0 + practical) if names else (1.0 - practical))
 
-    def fitted(effects: Sequence[Effect]) -> tuple[Fit, list[Effect]]:
-        # From where the others stood for one that was not there a fit may end beside the size that
-        # the rows determine.
-        fits = [fitter.fit(start) for start in (effects, usual(effects, problem.kind))]
-        largest = (1.0 + practical) * min(fitter.error(fit.predicted) for fit in fits)
-        known = [(fit, fitter.with_intervals(fit)) for fit in fits
-                 if fitter.error(fit.predicted) <= largest]
-        return min(known, key=lambda one: (len(one[0].implausible()), len(usual_undetermined(
-            one[1])), fitter.error(one[0].predicted)))
-
     def tried(effects: Sequence[Effect]) -> tuple[float, list[Effect]]:
-        fit, fitted_effects = fitted(effects)
+        fit = fitter.fit(effects)
+        fitted_effects = fitter.with_intervals(fit)
         new = [one.id for one in usual_undetermined(fitted_effects) if one.id not in names]
         # Where no effect explains the load, held-out loads would tell of what is missing.
         if fit.implausible() or len(new) > (1 if found else 0):

@@ -204,9 +204,9 @@ class _Profile:
         fit = self.fits[self.best]
         effects = own.with_intervals(fit)
         # What loads held out have determined is not refitted to rows that do not determine it.
-        names = undetermined_names(effects, problem.kind)
+        names = undetermined_names(effects, problem.kind).intersection(
+            one.id for one in self._found)
         vague = [one for one in self._found if one.id in names]
-        names = {effect.id for effect in vague}
         if vague:
             own = own.holding(vague)
             fit = own.fit([one for one in fit.effects if one.id not in names])

@@ -292,13 +292,12 @@ def _alone(fitter: BenchFitter, name: str) -> Fit | None:
 def _begun(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
     """Begin to fit effects, the last of them new, from usual values or those that each had."""
     kind = fitter.problem.kind
-    with np.errstate(all='ignore'):
-        return _finite(fitter.begin([
-            usual(effects, kind), effects, [*effects[:-1], *usual(effects[-1:], kind)]]))
+    return _begun_at_best(fitter, [
+        usual(effects, kind), effects, [*effects[:-1], *usual(effects[-1:], kind)]])
 
 
 def _begun_at_best(fitter: BenchFitter, starts: Sequence[Sequence[Effect]]) -> Fit | None:
-    """Begin to fit effects from the best of many starts."""
+    """Begin to fit effects from the best of several starts."""
     with np.errstate(all='ignore'):
         return _finite(fitter.begin(starts))
 

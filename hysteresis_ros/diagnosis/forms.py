@@ -70,7 +70,7 @@ def with_best_forms(fitter: BenchFitter, effects: Sequence[Effect], fixed: Colle
     return [found[effect.id] for effect in effects]
 
 
-class _Trial:
+class _FormFit:
     """
     One fit of effects in some forms, and how it compares.
 
@@ -106,11 +106,11 @@ class _Trial:
         """Effects whose sizes the rows do not determine."""
         return undetermined_names(self.effects, self._fitter.problem.kind)
 
-    def no_worse(self, than: _Trial) -> bool:
+    def no_worse(self, than: _FormFit) -> bool:
         """Whether held-out rows are predicted as well, by less than what matters."""
         return bool(np.all(self._held_out <= (1.0 + self._practical) * than._held_out))
 
-    def better(self, than: _Trial) -> bool:
+    def better(self, than: _FormFit) -> bool:
         """
         Whether rows tell this form from another one.
 
@@ -124,7 +124,7 @@ class _Trial:
                     and self._fitted < less * than._fitted)
 
 
-def _fitted(fitter: BenchFitter, effects: Sequence[Effect], forms: Forms) -> _Trial:
+def _fitted(fitter: BenchFitter, effects: Sequence[Effect], forms: Forms) -> _FormFit:
     """Return the better of a fit from the present values and one from the usual ones."""
     starts = [effects]
     if forms:
@@ -134,7 +134,7 @@ def _fitted(fitter: BenchFitter, effects: Sequence[Effect], forms: Forms) -> _Tr
     fits = [fitter.fit([effect.with_values(**forms.get(effect.id, {})) for effect in start])
             for start in starts]
     best = min(fits, key=lambda one: fitter.error(one.predicted))
-    return _Trial(fitter, fitter.cross_validate(best))
+    return _FormFit(fitter, fitter.cross_validate(best))
 
 
 def simplest_forms(effects: Sequence[Effect]) -> Forms:
