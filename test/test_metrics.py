@@ -163,6 +163,18 @@ def test_an_error_is_told_apart_into_that_of_the_ends_the_middle_and_the_drive(s
     assert found == pytest.approx(sizes, rel=0.15, abs=0.07)
 
 
+def test_parts_add_up_to_the_error_where_the_steepest_rows_are_off_by_less_than_their_slope():
+    # Most have turned and do not move, three are steep, and one far steeper.
+    response = np.array([0.0, *[0.5] * 10, 1.0])
+    slope = np.array([0.0, *[0.0] * 6, 1.0, 1.0, 1.0, 6.0, 0.0])
+    residual = np.array([0.1, *[-0.1] * 6, 3.0, -3.0, 3.0, -3.0, 0.1])
+    found = relative_rmse(residual, response, np.zeros(12), slope)['relative_rmse']
+    share = np.mean(4.0 * response * (1.0 - response))
+    assert found['drive'] == pytest.approx(1.0, abs=0.01)
+    assert (found['ends'] ** 2 * (1.0 - share) + found['halfway'] ** 2 * share
+            + found['drive'] ** 2) == pytest.approx(1.0)
+
+
 def test_a_response_that_no_drive_moves_says_nothing_of_the_drive():
     residual, response = np.array([1.0, 5.0, 1.0]), np.array([2.0, 3.0, 4.0])
     assert relative_rmse(residual, response, np.zeros(3), np.zeros(3)) == relative_rmse(

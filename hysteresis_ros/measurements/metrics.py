@@ -111,7 +111,9 @@ def relative_rmse(residual: np.ndarray, response: np.ndarray, trial: np.ndarray,
     with p the place of the response between the ends of its trial, s its slope and s0 the root mean
     square of that: an error of the ends, one of the middle, and one of the drive. They are those of
     normal errors that are most likely, found by the multiplicative rule that never lowers the
-    likelihood (Fevotte, Bertin and Durrieu, Neural Computation 21 (2009) 793).
+    likelihood (Fevotte, Bertin and Durrieu, Neural Computation 21 (2009) 793), and add up to the
+    mean square that was seen: likelihood keeps the ratio of error to expected error, and where
+    the steepest rows are off by less than their slope says, the parts would be more than it.
 
     Parameters
     ----------
@@ -144,7 +146,9 @@ def relative_rmse(residual: np.ndarray, response: np.ndarray, trial: np.ndarray,
         along = np.concatenate([slope[trial == one] for one in np.unique(trial[chosen])])
         found['drive_slope'] = float(np.sqrt(np.mean(along ** 2)))
         parts['drive'] = (along / found['drive_slope']) ** 2
-    variances = _most_likely(np.concatenate(squares), np.column_stack(list(parts.values())))
+    square, layout = np.concatenate(squares), np.column_stack(list(parts.values()))
+    variances = _most_likely(square, layout)
+    variances *= np.mean(square) / np.mean(layout @ variances)
     found['relative_rmse'] = dict(zip(parts, np.sqrt(variances).tolist()))
     return found
 
