@@ -299,8 +299,8 @@ def test_a_fit_that_stays_above_another_one_is_given_up():
     lag = catalogue()['valve_lag'](model.surroundings).with_values(filling=8.0, venting=8.0)
     whole = fitter.fit([lag])
     error = fitter.error(whole.predicted)
-    assert fitter.fit_below([lag], 0.5 * error) is None
-    below = fitter.fit_below([lag], 2.0 * error)
+    assert fitter.fit_below([[lag]], 0.5 * error) is None
+    below = fitter.fit_below([[lag]], 2.0 * error)
     assert fitter.error(below.predicted) == pytest.approx(error, rel=0.01)
     np.testing.assert_allclose(below.vector, whole.vector, atol=0.02)
 

@@ -33,9 +33,9 @@ class Fitter:
             predicted=np.array([self.errors[nearest]]),
             implausible=lambda: ['C'] if nearest in self.odd else [])
 
-    def fit_below(self, effects, error):
-        """Return the same, or None where it promises too little."""
-        fit = self.fit(effects)
+    def fit_below(self, starts, error):
+        """Return the best of several, or None where it promises too little."""
+        fit = min(map(self.fit, starts), key=lambda one: np.nan_to_num(one.predicted[0], nan=9.0))
         return fit if self.error(fit.predicted) <= error else None
 
     def error(self, predicted):

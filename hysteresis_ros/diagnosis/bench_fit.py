@@ -202,22 +202,19 @@ class BenchFitter:
         return response.fit(response.minimise(
             response.parameters.vector(), evaluations, tolerance))
 
-    def fit_below(self, effects: Sequence[Effect], error: float) -> Fit | None:
+    def fit_below(self, starts: Sequence[Sequence[Effect]], error: float) -> Fit | None:
         """
-        Fit from the present values of `effects`, or give up where that promises too little.
+        Fit from the best of several starts, or give up where that promises too little.
 
         Parameters
         ----------
-        effects : sequence of Effect
-            Effects to fit; their values are the start.
+        starts : sequence of sequence of Effect
+            Effects to fit; their values are the starts.
         error : float
             Largest error after the first steps that is worth going on, in the response's unit.
         """
-        response = Response(self.problem, self.fixed, effects)
-        vector = response.minimise(response.parameters.vector(), FIRST_EVALUATIONS, TOLERANCE)
-        if not self.error(response.predicted(vector)) <= error:
-            return None
-        return response.fit(response.minimise(vector, MOST_EVALUATIONS, TOLERANCE))
+        begun = self.begin(starts)
+        return self.fit(begun.effects) if self.error(begun.predicted) <= error else None
 
     def search(self, known: Sequence[Effect], effect: Effect) -> Fit:
         """

@@ -158,7 +158,7 @@ class BenchSearch:
                       and errors[other] < (1.0 - WORTH_JUDGING) * errors[names]]
             if larger:
                 ended = found[min(larger, key=lambda one: errors[one])]
-                starts.append(([effect for effect in ended.effects if effect.id in names],
+                starts.append(([[effect for effect in ended.effects if effect.id in names]],
                                (1.0 + WORTH_JUDGING) * errors[names]))
         for fit in self._in_parallel(_fitted_below, self.fitter, starts):
             names = frozenset(fit.names)
@@ -175,12 +175,11 @@ class BenchSearch:
         found = {fit.names: fit for fit in fits}
         errors = {fit.names: self.fitter.error(fit.predicted) for fit in fits}
         for fit in self._in_parallel(_fitted_below, self.fitter, [
-                (effects, (1.0 + WORTH_JUDGING) * errors[one.names])
-                for one in fits for effects in at_other_shifts(one.effects)]):
+                (starts, (1.0 + WORTH_JUDGING) * errors[one.names])
+                for one in fits for starts in [at_other_shifts(one.effects)] if starts]):
             error = self.fitter.error(fit.predicted)
             if error < (1.0 - self._practical) * errors[fit.names] and not fit.implausible():
-                if error < self.fitter.error(found[fit.names].predicted):
-                    found[fit.names] = fit
+                found[fit.names] = fit
         return list(found.values())
 
     def _in_other_forms(self, fits: Sequence[Fit]) -> list[Fit]:
@@ -308,11 +307,12 @@ def _fitted(fitter: BenchFitter, effects: Sequence[Effect]) -> Fit | None:
         return _finite(fitter.fit(effects))
 
 
-def _fitted_below(fitter: BenchFitter, start: tuple[Sequence[Effect], float]) -> Fit | None:
-    """Fit some effects from their present values, unless the error stays above another one."""
-    effects, error = start
+def _fitted_below(fitter: BenchFitter, begun: tuple[Sequence[Sequence[Effect]], float]
+                  ) -> Fit | None:
+    """Fit some effects from the best of several starts, unless the error stays above another."""
+    starts, error = begun
     with np.errstate(all='ignore'):
-        fit = fitter.fit_below(effects, error)
+        fit = fitter.fit_below(starts, error)
         return None if fit is None else _finite(fit)
 
 
