@@ -401,7 +401,8 @@ def test_every_load_counts_alike_whatever_its_error(selection):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('muscle, seed', [
-    ('lagoudas', 6302), pytest.param('lagoudas', 6311, marks=pytest.mark.long),
+    pytest.param('lagoudas', 6302, marks=pytest.mark.long),
+    pytest.param('lagoudas', 6311, marks=pytest.mark.long),
     pytest.param('brinson', 6353, marks=pytest.mark.long),
     pytest.param('brinson', 6602, marks=pytest.mark.long),
     pytest.param('brinson', 6601, marks=pytest.mark.long), ('brinson', 6708)])

@@ -63,7 +63,7 @@ def harder_to_start(monkeypatch):
 
 
 def test_friction_that_is_larger_at_rest_is_friction(harder_to_start):
-    found = found_in({'coulomb_friction': 1.0}, 5, protocol='arm-steps')
+    found = found_in({'coulomb_friction': 1.0}, 5, protocol='arm-steps', trials=(0, 1))
     assert found.verdict == 'missing' and 'coulomb_friction' in named(found)
     assert found.rmse_after < 0.4 * found.rmse_before
 
@@ -161,8 +161,8 @@ def test_heat_lost_by_convection_or_radiation_alone_is_heat_loss(monkeypatch, ra
     assert found.rmse_after < 0.4 * found.rmse_before
 
 
-@pytest.mark.parametrize('protocol', [
-    'arm-steps', pytest.param('arm-dynamic', marks=LONG)])
+@pytest.mark.long
+@pytest.mark.parametrize('protocol', ['arm-steps', 'arm-dynamic'])
 def test_heat_that_is_lost_otherwise_than_on_the_bench_is_heat_loss(monkeypatch, protocol):
     """By natural convection from the arm's wires, from those of the bench in proportion."""
     def change(air, excess, balance, rate, dt):

@@ -16,6 +16,7 @@ import pytest
 import threadpoolctl
 
 from hysteresis_ros import workers
+from hysteresis_ros.diagnosis import bench_selection
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.diagnose import diagnose
@@ -123,6 +124,7 @@ def test_adding_effects_to_a_bench_leaves_blas_one_thread(three, monkeypatch):
         return fit(self, *args, **options)
 
     monkeypatch.setattr(BenchFitter, 'fit', watched)
+    monkeypatch.setattr(bench_selection, 'observable', lambda problem: (['stress_dependence'], {}))
     drive = np.concatenate([np.linspace(0.0, 6.0, 15), np.linspace(6.0, 0.0, 15)])
     model, loads = bicep_model(), (1.0, 3.0, 5.0)
     table = Measurement.from_columns({
