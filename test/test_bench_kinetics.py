@@ -114,7 +114,7 @@ def test_rows_left_out_tell_the_share(usual, share):
     assert shown.after < 0.9 * shown.before
 
 
-@pytest.mark.parametrize('rho', [0.0, 0.9])
+@pytest.mark.parametrize('rho', [0.0, pytest.param(0.9, marks=pytest.mark.long)])
 def test_no_bench_whose_loops_close_shows_them(usual, rho):
     """Whatever its noise, which may last for ten rows."""
     for seed in range(4):
@@ -209,6 +209,7 @@ def test_identification_adds_them_to_what_the_bench_proves(usual, force, tables,
     assert all('kinetics' in {effect.id for effect in one.effects} for one in whole.replicates)
 
 
+@pytest.mark.long
 def test_an_effect_that_is_left_out_is_not_sought_again(usual, force, tables):
     plain = identify(tables, force, **TRIALS).model
     problem = problem_for(plain, [tables.select(range(4))])

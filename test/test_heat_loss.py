@@ -186,6 +186,7 @@ def test_the_laboratorys_balance_is_that_of_the_bench(share):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_it_is_found_among_lags_on_an_arm_of_the_laboratory():
     lags = ['heat_loss', 'thermal_lag', 'heating_cooling_asymmetry', 'latency', 'airflow']
     found = found_in({'heat_loss': 1.0}, 4, lags)

@@ -55,7 +55,7 @@ def diagnosis(verdict='missing', **changes):
         'ranking': [row('payload_error', 0.002), row('supply_sag', 0.05, False)],
         'sets': [{'effects': ['payload_error'], 'probability': 0.9, 'rmse': 0.002},
                  {'effects': ['unknown'], 'probability': 0.1, 'rmse': 0.08}],
-        'noise_floor': 1e-3, 'structural_error': 5e-3, 'unexplained': 0.01,
+        'noise_floor': 1e-3, 'structural_error': 5e-3, 'bench_error': 4e-3, 'unexplained': 0.01,
         'experiment': 'weigh the payload & the forearm', 'effects': [], 'rmse_before': 0.08,
         'rmse_after': 0.002, 'not_excited': {'latency': 'every row is settled'}, 'event': None,
         'signal': '', **changes}
@@ -238,6 +238,14 @@ def test_the_text_tells_probabilities_and_what_absorbed_means():
             'an unknown cause 0.01\n') in text
     assert 'absorbed: share of what an effect changes' in text
     assert 'probability' not in to_text(diagnosis(sets=[], ranking=[]), 'angle')
+
+
+def test_the_text_says_apart_what_the_bench_shows_of_the_models_error():
+    text = to_text(diagnosis(), 'angle')
+    assert ('error of the base model, as its bench shows, about 0.23 deg, with what no bench of '
+            'constant loads shows 0.29 deg, unexplained') in text
+    assert 'error of the base model' not in to_text(
+        diagnosis(bench_error=None, structural_error=None), 'angle')
 
 
 def test_an_effect_is_not_both_ranked_and_one_that_could_not_have_shown():

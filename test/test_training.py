@@ -20,6 +20,7 @@ def test_training_is_found_with_its_signs():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_defects_that_delay_the_transformation_are_wear_and_no_cooler_room(monkeypatch):
     """They settle with the cycles; the catalogue's equation goes on with their logarithm."""
     room = Arm._room

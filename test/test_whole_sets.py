@@ -91,6 +91,7 @@ def test_nothing_is_tried_together_without_a_load(wire):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_effects_that_stand_for_each_other_are_all_named(wire):
     """Grown by one at a time, sets end with three of them and 369 um where loads are left out."""
     found = diagnose(wire.with_effects([]), [made_with(wire)])

@@ -91,7 +91,8 @@ def to_text(found: Diagnosis, response: str) -> str:
     lines.append(', '.join([
         f'{noise_in_words(found)} {factor * found.noise_floor:.2g} {unit}',
         *(f'{name} {factor * value:.2g} {unit}' for name, value in (
-            ('error of the base model about', found.structural_error),
+            ('error of the base model, as its bench shows, about', found.bench_error),
+            ('with what no bench of constant loads shows', found.structural_error),
             ('no error matters below', found.small_error)) if value is not None),
         f'unexplained {100.0 * found.unexplained:.0f} %']))
     if found.sets:

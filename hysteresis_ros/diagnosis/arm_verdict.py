@@ -99,6 +99,7 @@ class _Verdict:
             ranking=self._ranking(missing, before), sets=self._sets(shares),
             noise_floor=self.sets.fits[chosen].noise,
             structural_error=selection.covariance.discrepancy.size,
+            bench_error=selection.covariance.discrepancy.size_besides_courses,
             unexplained=self._unexplained(chosen),
             experiment=verdict.next_experiment(
                 kind, to_add, [alternatives[name] for name in missing], unobservable),

@@ -71,7 +71,7 @@ def bench_verdict(problem: BenchProblem, settings: Settings, rng: np.random.Gene
         verdict=kind, missing=missing, alternatives=named,
         ranking=_ranking(selection, missing), sets=_sets(selection, unknown),
         # The weights are refitted: no error of the model is known beforehand.
-        noise_floor=_sensor_noise(problem), structural_error=None,
+        noise_floor=_sensor_noise(problem), structural_error=None, bench_error=None,
         unexplained=float(np.clip(unexplained, 0.0, 1.0)),
         experiment=verdict.next_experiment(
             kind, missing or resembles, named, hidden),

@@ -49,6 +49,9 @@ class Diagnosis(Result):
         White noise of the sensor, in the unit of the response.
     structural_error : float or None
         Expected error of the base model; None on a bench, where it is not known.
+    bench_error : float or None
+        The part of it that the bench shows. The rest is what the wire may do besides, with a share
+        from none to all that no bench of constant loads tells: see `Discrepancy.courses`.
     unexplained : float
         Share of the mean square error that nothing explains.
     experiment : str
@@ -103,6 +106,7 @@ class Diagnosis(Result):
     sets: list[dict[str, Any]]
     noise_floor: float
     structural_error: float | None
+    bench_error: float | None
     unexplained: float
     experiment: str
     effects: list[Effect]

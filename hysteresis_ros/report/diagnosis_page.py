@@ -142,7 +142,8 @@ def _parts_of_the_error(found: Diagnosis, scale: float, unit: str) -> str:
         (f'{found.error_name} with them', found.rmse_after if found.missing else None),
         ('RMSE of all these rows without the effects', found.pooled_before),
         ('RMSE of all these rows with them', found.pooled_after if found.missing else None),
-        ('error of the base model by itself (from the bench)', found.structural_error),
+        ('error of the base model by itself, as its bench shows', found.bench_error),
+        ('the same with what no bench of constant loads shows', found.structural_error),
         ('error below which none matters: 1 % of the range, or the noise', found.small_error),
         (noise_in_words(found), found.noise_floor)]
     words = typical_in_words(found)
