@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import copy
 import dataclasses
 from typing import TYPE_CHECKING
@@ -13,8 +13,10 @@ import numpy as np
 from scipy import special    # its stats take a second to import
 
 from hysteresis_ros.diagnosis.arm_fit import DIFFERENCE, Fit
+from hysteresis_ros.diagnosis.determined import spans
 from hysteresis_ros.diagnosis.observable import unaffected
 from hysteresis_ros.diagnosis.parameters import ParameterVector, starts_of
+from hysteresis_ros.diagnosis.profile import profile_interval
 from hysteresis_ros.effects import Effect
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.identification.gauss_newton import minimise
@@ -65,18 +67,28 @@ class Response:
         self._solutions: dict[bytes, Solution] = {}
         self._derivatives: dict[bytes, np.ndarray] = {}
 
-    def minimise(self, start: np.ndarray, evaluations: int, tolerance: float) -> np.ndarray:
-        """Return the vector (k,) of least squares near a start."""
+    def minimise(self, start: np.ndarray, evaluations: int, tolerance: float,
+                 held: Mapping[int, float] | None = None) -> np.ndarray:
+        """Return the vector (k,) of least squares near a start, with some components held."""
         if len(start) == 0:
             return start
         mean, pull = self._known_beforehand(start)
+        lower, upper = self.parameters.lower.copy(), self.parameters.upper.copy()
+        for index, value in (held or {}).items():
+            lower[index] = upper[index] = value
         emphasis = self.problem.emphasis
         return minimise(
             lambda vector: np.append((emphasis * (self.predicted(vector) - self.problem.measured))[
                 self._fitted] / self._scale, pull @ (vector - mean)),
             lambda vector: np.vstack(((emphasis[:, None] * self.jacobian(vector))[
                 self._fitted] / self._scale, pull)),
-            start, self.parameters.lower, self.parameters.upper, evaluations, tolerance)
+            start, lower, upper, evaluations, tolerance)
+
+    def squares(self, vector: np.ndarray) -> float:
+        """Return the sum of squares of the rows fitted, as they count."""
+        error = (self.problem.emphasis * (self.predicted(vector) - self.problem.measured))[
+            self._fitted]
+        return float(error @ error)
 
     def _known_beforehand(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """
@@ -280,7 +292,9 @@ class BenchFitter:
         Return the fitted effects with intervals of their parameters.
 
         From the Jacobian, with the residuals summed by block (a sandwich estimate), because
-        residuals of a simulated response are correlated.
+        residuals of a simulated response are correlated. Where that says nothing of an effect's
+        size, its interval is that of the profile of the squares, with as many independent rows as
+        there are blocks.
         """
         response = Response(self.problem, self.fixed, fit.effects)
         parameters = response.parameters
@@ -302,10 +316,17 @@ class BenchFitter:
         count = len(scores)
         freedom = max(count - len(parameters), 1)
         covariance = count / freedom * inverse @ (scores.T @ scores) @ inverse
-        half = special.stdtrit(freedom, 0.5 + level / 2.0) * np.sqrt(
-            np.maximum(np.diag(covariance), 0.0))
+        quantile = float(special.stdtrit(freedom, 0.5 + level / 2.0))
+        half = quantile * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         half[free] = np.inf
-        return parameters.with_intervals(fit.vector, half)
+        effects = parameters.with_intervals(fit.vector, half)
+        for index, (number, parameter) in enumerate(parameters.entries):
+            intervals = effects[number].intervals
+            if (parameter is effects[number].size_parameter
+                    and spans(parameter, *intervals[parameter.name])):
+                intervals[parameter.name] = parameters.values_at(index, profile_interval(
+                    response, fit.vector, index, 1.0 + quantile ** 2 / freedom))
+        return effects
 
     def parameters_in_use(self, fit: Fit) -> int:
         """Return how many parameters of a fit the response depends on; a form may be idle alone."""

@@ -7,10 +7,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 import math
 
-from hysteresis_ros.effects import Effect
+from hysteresis_ros.effects import Effect, Parameter
 
 # An interval that covers this share of a physical range says nothing.
 SPANS = 0.9
+
+
+def spans(parameter: Parameter, low: float, high: float) -> bool:
+    """Whether an interval of a parameter covers its whole physical range, but for a little."""
+    least, most = (-parameter.high if parameter.both_signs else parameter.low), parameter.high
+    return min(high, most) - max(low, least) >= SPANS * (most - least)
 
 
 def undetermined(effect: Effect, kind: str) -> list[str]:
@@ -19,10 +25,7 @@ def undetermined(effect: Effect, kind: str) -> list[str]:
     for parameter in effect.parameters:
         if parameter.choices or parameter.form or kind not in parameter.kinds:
             continue
-        low, high = effect.intervals.get(parameter.name, (math.nan, math.nan))
-        least, most = (-parameter.high if parameter.both_signs else parameter.low), parameter.high
-        covered = min(high, most) - max(low, least)
-        if covered >= SPANS * (most - least):
+        if spans(parameter, *effect.intervals.get(parameter.name, (math.nan, math.nan))):
             found.append(f'the interval of {effect.id}.{parameter.name} spans its physical range: '
                          'these recordings do not determine it')
     return found

@@ -52,14 +52,8 @@ class ParameterVector:
 
         The plausible range is the middle 87 % (1.5 standard deviations to each side).
         """
-        mean, spread = [], []
-        for _, parameter in self.entries:
-            low, high = (_to_unit(parameter, value) for value in (parameter.low, parameter.high))
-            if parameter.both_signs:
-                low = -high
-            mean.append(0.5 * (low + high))
-            spread.append(0.5 * (high - low) / 1.5)
-        return np.array(mean), np.array(spread)
+        low, high = np.reshape([self.plausible(index) for index in range(len(self))], (-1, 2)).T
+        return 0.5 * (low + high), 0.5 * (high - low) / 1.5
 
     def with_vector(self, vector: np.ndarray) -> list[Effect]:
         """Return the effects with the values of a vector of shape (k,)."""
@@ -78,6 +72,18 @@ class ParameterVector:
         """
         free = ParameterVector(effects, self._kind).entries
         return np.array([entry in free for entry in self.entries], dtype=bool)
+
+    def plausible(self, index: int) -> tuple[float, float]:
+        """Return the plausible range of one parameter, in the units of the vector."""
+        _, parameter = self.entries[index]
+        low, high = (_to_unit(parameter, value) for value in (parameter.low, parameter.high))
+        return (-high if parameter.both_signs else low), high
+
+    def values_at(self, index: int, places: tuple[float, float]) -> tuple[float, float]:
+        """Return the values of one parameter at two places in the units of the vector."""
+        _, parameter = self.entries[index]
+        low, high = (_from_unit(parameter, place) for place in places)
+        return low, high
 
     def with_intervals(self, vector: np.ndarray, half_widths: np.ndarray) -> list[Effect]:
         """Return the effects at `vector` (k,) with the intervals of `half_widths` (k,)."""
