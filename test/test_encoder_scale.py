@@ -41,6 +41,12 @@ def test_an_eccentric_disc_that_does_as_well_comes_first():
     assert 0.0 < effect_of(model, 'encoder_scale').prior_odds < disc.prior_odds == 1.0
 
 
+def test_an_encoder_set_by_eye_to_the_upright_or_the_hanging_arm_is_plausible():
+    for theta_0 in (-3.0, 0.0, 180.0, 183.0):
+        assert catalogue()['encoder_scale'](k=1.2, theta_0=theta_0).implausible() == []
+    assert catalogue()['encoder_scale'](k=1.2, theta_0=-60.0).implausible() == ['theta_0']
+
+
 @pytest.mark.parametrize('k, theta_0', [(0.8, 140.0), (1.25, 60.0), (2.0, 90.0)])
 def test_it_is_named_with_its_size(k, theta_0):
     model = bicep_model()

@@ -33,7 +33,8 @@ class EncoderScale(SensorEffect):
         # 2000 for 2048 pulses are 2.4 %, the next switch is a factor of two.
         Parameter('k', '1', 'measured over true change of the angle', 0.25, 4.0, 1.0,
                   (0.5, 0.9, 1.1, 2.0), log=True),
-        Parameter('theta_0', 'deg', 'angle where the counts are right', 0.0, 180.0, 90.0,
+        # Set by eye against the upright or the hanging arm, and estimated.
+        Parameter('theta_0', 'deg', 'angle where the counts are right', -20.0, 200.0, 90.0,
                   (45.0, 135.0), limits=(-360.0, 360.0)),)
 
     @property
