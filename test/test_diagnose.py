@@ -184,9 +184,9 @@ def test_a_lag_shows_in_transients(model):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize('tau, dt, hold', [
-    (0.05, 0.02, 1.0), pytest.param(0.1, 0.02, 1.0, marks=pytest.mark.long),
-    pytest.param(100.0, 2.0, 150.0, marks=pytest.mark.long)])
+    (0.05, 0.02, 1.0), (0.1, 0.02, 1.0), (100.0, 2.0, 150.0)])
 def test_lags_at_the_ends_of_their_range_are_found(tau, dt, hold):
     """On a wire of other physics than the model's, where a fit from far away does not arrive."""
     model, _ = add_effects(*clean_bench(41, 'brinson'), [*UNIVERSAL, 'transformation_slopes'],

@@ -62,6 +62,7 @@ def harder_to_start(monkeypatch):
     monkeypatch.setattr(Arm, '_find_balance', find_balance)
 
 
+@LONG
 def test_friction_that_is_larger_at_rest_is_friction(harder_to_start):
     found = found_in({'coulomb_friction': 1.0}, 5, protocol='arm-steps', trials=(0, 1))
     assert found.verdict == 'missing' and 'coulomb_friction' in named(found)

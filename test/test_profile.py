@@ -32,7 +32,7 @@ class Valley:
 
     def minimise(self, start, evaluations, tolerance, held):
         """Return the best second parameter for a first that is held."""
-        first = held[0]
+        _, first = held
         return np.array([first, np.clip(1.0 / first if first else 0.0, 0.2, 5.0)])
 
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 import copy
 import dataclasses
 from typing import TYPE_CHECKING
@@ -68,13 +68,14 @@ class Response:
         self._derivatives: dict[bytes, np.ndarray] = {}
 
     def minimise(self, start: np.ndarray, evaluations: int, tolerance: float,
-                 held: Mapping[int, float] | None = None) -> np.ndarray:
-        """Return the vector (k,) of least squares near a start, with some components held."""
+                 held: tuple[int, float] | None = None) -> np.ndarray:
+        """Return the vector (k,) of least squares near a start; one component may be held."""
         if len(start) == 0:
             return start
         mean, pull = self._known_beforehand(start)
         lower, upper = self.parameters.lower.copy(), self.parameters.upper.copy()
-        for index, value in (held or {}).items():
+        if held is not None:
+            index, value = held
             lower[index] = upper[index] = value
         emphasis = self.problem.emphasis
         return minimise(

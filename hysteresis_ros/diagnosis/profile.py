@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 # Bisections of the way to an end that is refused: the interval is off by a sixteenth of it.
 BISECTIONS = 3
+# As a fit of all parameters has them.
 EVALUATIONS, TOLERANCE = 8, 1e-3
 
 
@@ -51,7 +52,7 @@ def profile_interval(response: Response, vector: np.ndarray, index: int, most: f
     allowed = most * response.squares(vector)
 
     def keeps(value: float) -> bool:
-        found = response.minimise(vector, EVALUATIONS, TOLERANCE, {index: value})
+        found = response.minimise(vector, EVALUATIONS, TOLERANCE, (index, value))
         return response.squares(found) <= allowed
 
     parameters = response.parameters
