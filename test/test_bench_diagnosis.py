@@ -303,6 +303,10 @@ def test_a_fit_that_stays_above_another_one_is_given_up():
     below = fitter.fit_below([[lag]], 2.0 * error)
     assert fitter.error(below.predicted) == pytest.approx(error, rel=0.01)
     np.testing.assert_allclose(below.vector, whole.vector, atol=0.02)
+    # Of several starts the best one is followed.
+    far = lag.with_values(filling=0.1, venting=90.0)
+    best = fitter.fit_below([[far], [lag]], 2.0 * error)
+    assert fitter.error(best.predicted) == pytest.approx(error, rel=0.01)
 
 
 def test_where_weights_are_sought_first_does_not_change_them():

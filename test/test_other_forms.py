@@ -162,7 +162,7 @@ def test_heat_lost_by_convection_or_radiation_alone_is_heat_loss(monkeypatch, ra
     assert found.rmse_after < 0.4 * found.rmse_before
 
 
-@pytest.mark.long
+@LONG
 @pytest.mark.parametrize('protocol', ['arm-steps', 'arm-dynamic'])
 def test_heat_that_is_lost_otherwise_than_on_the_bench_is_heat_loss(monkeypatch, protocol):
     """By natural convection from the arm's wires, from those of the bench in proportion."""

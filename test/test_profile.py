@@ -4,7 +4,9 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
+from hysteresis_ros.diagnosis import bench_fit
 from hysteresis_ros.diagnosis.determined import not_determined, spans
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.profile import profile_interval
@@ -54,6 +56,18 @@ def growing():
     return wire, fitter_of(wire.with_effects([]), made_with(wire))
 
 
+@pytest.mark.slow
+def test_its_level_is_that_of_an_f_test_with_a_row_for_each_block(growing, monkeypatch):
+    wire, fitter = growing
+    fit, allowed = fitter.fit(wire.effects), []
+    monkeypatch.setattr(bench_fit, 'profile_interval', lambda response, vector, index, most: (
+        allowed.append(most) or (-1.0, 1.0)))
+    fitter.with_intervals(fit)
+    freedom = len(np.unique(fitter.problem.block)) - len(fit.vector)
+    assert allowed == [pytest.approx(1.0 + stats.f.ppf(0.95, 1, freedom) / freedom)]
+
+
+@pytest.mark.slow
 def test_a_growth_of_which_one_load_tells_is_sure(growing):
     wire, fitter = growing
     fit = fitter.fit(wire.effects)
@@ -77,6 +91,7 @@ def test_what_acts_beside_a_growth_of_which_one_load_tells_has_its_size(growing)
     assert values['series_compliance'].compliance == pytest.approx(0.15, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_is_not_there_is_not_determined(growing):
     wire, fitter = growing
     fit = fitter.fit([*wire.effects, effect_of(wire, 'series_compliance', compliance=0.01)])
