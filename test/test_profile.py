@@ -79,7 +79,7 @@ def test_a_growth_of_which_one_load_tells_is_sure(growing):
 
 @pytest.mark.slow
 @pytest.mark.long
-def test_what_acts_beside_a_growth_of_which_one_load_tells_has_its_size(growing):
+def test_what_acts_with_a_growth_of_which_one_load_tells_has_its_size(growing):
     """Without the growth a softer martensite had twice the size, and nothing was elastic."""
     wire, _ = growing
     wire = wire.with_effects([*wire.effects, effect_of(wire, 'phase_modulus', m=0.06),

@@ -28,9 +28,10 @@ EVALUATIONS, TOLERANCE = 8, 1e-3
 def profile_interval(response: Response, vector: np.ndarray, index: int, most: float
                      ) -> tuple[float, float]:
     """
-    Return the interval of one parameter in which the others can keep the squares small.
+    Return the likelihood interval of one parameter, the others fitted at each of its values.
 
-    The likelihood interval of Venzon and Moolgavkar, J. R. Stat. Soc. C 37 (1988) 87.
+    Where the sum of squares, at its least over the others, is `most` times the least of all at most
+    (Venzon and Moolgavkar, J. R. Stat. Soc. C 37 (1988) 87).
 
     Parameters
     ----------
@@ -51,21 +52,21 @@ def profile_interval(response: Response, vector: np.ndarray, index: int, most: f
     """
     allowed = most * response.squares(vector)
 
-    def keeps(value: float) -> bool:
+    def allows(value: float) -> bool:
         found = response.minimise(vector, EVALUATIONS, TOLERANCE, (index, value))
         return response.squares(found) <= allowed
 
     parameters = response.parameters
     low, high = (
-        float(bound) if keeps(end) else _end(keeps, float(vector[index]), end)
+        float(bound) if allows(end) else _end(allows, float(vector[index]), end)
         for end, bound in zip(parameters.plausible(index), (
             parameters.lower[index], parameters.upper[index])))
     return low, high
 
 
-def _end(keeps: Callable[[float], bool], inside: float, outside: float) -> float:
-    """Return the farthest value from inside with which the squares are small, by bisection."""
+def _end(allows: Callable[[float], bool], inside: float, outside: float) -> float:
+    """Return the end of the interval between a value inside and one outside, by bisection."""
     for _ in range(BISECTIONS):
         middle = 0.5 * (inside + outside)
-        inside, outside = (middle, outside) if keeps(middle) else (inside, middle)
+        inside, outside = (middle, outside) if allows(middle) else (inside, middle)
     return 0.5 * (inside + outside)
