@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hysteresis_ros.diagnosis import selection
+from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, room_change, room_is_calm
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -13,7 +14,11 @@ from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects.ambient import AmbientTemperature
 from hysteresis_ros.identification.bench import identify
-from hysteresis_ros.laboratory.experiments import experiment_tables
+from hysteresis_ros.laboratory import sequences
+from hysteresis_ros.laboratory.bench import Bench, HOLD
+from hysteresis_ros.laboratory.conditions import Air, Conditions
+from hysteresis_ros.laboratory.experiments import experiment_tables, LOADS
+from hysteresis_ros.laboratory.plant import specimen
 from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.model import MuscleModel
 from model_support import bicep_model, effect_of, runs, with_noise
@@ -32,6 +37,35 @@ def in_room(ambient, reference, *others, gain=0.4, seed=0):
     room = effect_of(MODEL, 'ambient_temperature', gain=gain, reference=reference)
     return Measurement.from_columns({
         **run.columns, 'angle': MODEL.with_effects([room, *others]).predict(run)})
+
+
+def bench_in_room(swing, seed=8701, random=(False, True)):
+    """Return the length table of a wire whose room swings by so many kelvins, and is recorded."""
+    air = Air(swing=swing, period=5400.0, phase=1.0)
+    bench = Bench(Conditions(material=specimen(seed, 'grains'), air=air), seed=seed)
+    rng, columns = np.random.default_rng(seed), []
+    for trial, (load, steps) in enumerate((load, steps) for steps in random for load in LOADS):
+        drive = sequences.random_steps(40, rng) if steps else sequences.damped_oscillation()
+        room = [air.recorded(bench.time + HOLD * (n + 1)) for n in range(len(drive))]
+        columns.append([np.full(len(drive), trial), np.arange(len(drive)), drive,
+                        np.full(len(drive), load), bench.length_trial(drive, load), room])
+    return Measurement.from_columns(dict(zip(
+        ('trial', 'step', 'voltage', 'force', 'length', 'ambient_temperature'),
+        np.concatenate(columns, axis=1))))
+
+
+def without_thermometer(table):
+    """Return the same table as if nobody had recorded the room."""
+    return Measurement.from_columns({name: column for name, column in table.columns.items()
+                                     if name != 'ambient_temperature'})
+
+
+def verified(table, names):
+    """Return the error [m] of the trials that verify, and the effects that were added."""
+    force = Measurement.from_columns(experiment_tables('bench', {}, 8701)['force.csv'])
+    fitted = {'length_trials': range(len(LOADS)), 'force_trials': [0]}
+    model, added = add_effects(identify(table, force, **fitted).model, table, force, names, **fitted)
+    return model.metrics['length']['verification']['rmse'], added
 
 
 def discrepancy_of(problem, room):
@@ -72,7 +106,7 @@ def test_a_room_that_wanders_little_is_an_error_of_known_course():
     gain = MODEL.surroundings.full_drive_squared / 80.0
     moved = problem.simulate([effect_of(
         MODEL, 'ambient_temperature', gain=gain,
-        reference=float(np.mean(problem.signals['ambient'])))])
+        reference=float(np.mean(problem.ambient)))])
     np.testing.assert_allclose(change, moved - problem.simulate([]), atol=1e-12)
     without, with_it = (discrepancy_of(problem, room) for room in (False, True))
     assert room_is_calm(problem, without)
@@ -150,3 +184,58 @@ def test_of_a_bench_in_the_same_room_nothing_else_is_taken_for_it():
     found = diagnose(model, [in_room(27.0 + 0.4 * WANDER, 22.0)], SEVERAL)
     assert (found.missing, found.alternatives) == (['ambient_temperature'], [[]])
     assert found.effects[0].gain == pytest.approx(0.4, rel=0.15)
+
+
+def test_a_room_as_warm_all_the_time_counts_where_the_bench_had_another_one():
+    """The difference was recorded, if on two days; without the bench's nothing is known of it."""
+    model = bicep_model(ranges={**MODEL.ranges, 'ambient_temperature': (21.8, 22.2)})
+    warm = in_room(25.0, 22.0)
+    assert 'ambient_temperature' in observable(problem_for(model, [warm]))[0]
+    assert 'ambient_temperature' not in observable(problem_for(MODEL, [warm]))[0]
+    found = diagnose(model, [warm], SEVERAL)
+    assert 'ambient_temperature' in {*found.missing, *sum(found.alternatives, [])}
+    problem = problem_for(model, [in_room(22.3, 22.0)])
+    moved = problem.simulate([effect_of(
+        model, 'ambient_temperature', gain=model.surroundings.full_drive_squared / 80.0,
+        reference=22.0)])
+    assert np.any(room_change(problem, []))
+    np.testing.assert_allclose(room_change(problem, []), moved - problem.simulate([]), atol=1e-12)
+
+
+def test_the_bench_of_the_laboratory_feels_its_room():
+    """Trials follow each other, and the wire is as warm as the air before each of them."""
+    calm, swinging = (bench_in_room(swing, random=(False,)) for swing in (0.0, 3.0))
+    room = swinging.column('ambient_temperature')
+    assert np.ptp(calm.column('ambient_temperature')) == 0.0 and 3.0 < np.ptp(room) < 6.0
+    again = bench_in_room(0.0, random=(False,))
+    np.testing.assert_array_equal(calm.column('length'), again.column('length'))
+    change = swinging.column('length') - calm.column('length')
+    halfway = np.abs(calm.column('voltage') - 3.6) < 0.7
+    # Warm air heats as the drive does, and a wire that is heated gets shorter.
+    assert np.corrcoef(room[halfway], change[halfway])[0, 1] < -0.5
+    assert np.ptp(change) > 1e-3
+
+
+@pytest.mark.slow
+def test_a_bench_says_how_much_its_recorded_room_counts():
+    table = bench_in_room(3.0)
+    own = ['stress_dependence', 'series_compliance', 'stress_dependent_strain']
+    worse, _ = verified(table, own)
+    error, added = verified(table, [*own, 'ambient_temperature'])
+    room = added[-1]
+    assert error < 0.5 * worse
+    # In the laboratory 36 V^2 heat by 97 K.
+    assert room.gain == pytest.approx(36.0 / 97.0, rel=0.15)
+    assert 'gain' in room.intervals and 'reference' not in room.intervals
+
+
+@pytest.mark.long
+def test_a_bench_in_a_swinging_room_lacks_that_and_what_the_wire_has():
+    table = bench_in_room(3.0)
+    error, added = verified(table, None)
+    blind, _ = verified(without_thermometer(table), None)
+    assert 'ambient_temperature' in [effect.id for effect in added]
+    assert error < 1e-4 and blind > 2.5e-4
+    calm, named = verified(bench_in_room(0.0), None)
+    assert 'ambient_temperature' not in [effect.id for effect in named]
+    assert error < 1.2 * calm

@@ -454,9 +454,10 @@ def room_is_calm(problem: ArmProblem, discrepancy: Discrepancy) -> bool:
 
 def room_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """
-    Return what the recorded room typically does to the response, about its mean, shape (n,).
+    Return what the recorded room typically does to the response, shape (n,).
 
-    Not that of a room that is as warm all the time but another one than the bench's.
+    Against the bench's where that was recorded, else about its own mean: what a room does that is
+    as warm all the time is not known without the bench's.
 
     Parameters
     ----------
@@ -465,12 +466,13 @@ def room_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     effects : sequence of Effect
         All effects of the model.
     """
-    ambient = problem.signals.get('ambient')
     surroundings = problem.model.surroundings
-    if (ambient is None or surroundings.drive not in (*ELECTRIC_DRIVES, 'power')
+    recorded = problem.ambient[np.isfinite(problem.ambient)]
+    if (not len(recorded) or surroundings.drive not in (*ELECTRIC_DRIVES, 'power')
             or any(effect.id == AmbientTemperature.id for effect in effects)):
         return np.zeros(len(problem.measured))
+    bench = AmbientTemperature.usual(surroundings)
     typical = AmbientTemperature(
         surroundings, gain=surroundings.full_drive_squared / FULL_HEAT,
-        reference=float(np.mean(ambient)))
+        reference=float(np.mean(recorded)) if bench is None else bench)
     return _change_by(typical, problem, effects)

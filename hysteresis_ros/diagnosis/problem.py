@@ -60,11 +60,14 @@ class Problem:
         Standard deviation that white noise can have at most, as all rows show it.
     clock, own_clock : ndarray, shape (n,)
         Time of each row since the first recording began, and since its own did [s].
+    ambient : ndarray, shape (n,)
+        Recorded temperature of the room [degC], NaN where there is none.
     trial, fold, block : ndarray of int, shape (n,)
         Which trial a row is of, which rows are held out together, and which count as one in the
         significance.
     signals : dict of str to ndarray, shape (n,)
-        What was recorded or follows from it: drive, rate, time, since_step, cycles, ...
+        What was recorded or follows from it, and varies: drive, rate, time, since_step, cycles,
+        ...
     """
 
     # Effects to try; None for the whole catalogue.
@@ -164,7 +167,7 @@ class Problem:
         signals = {name: self.pick(values) for name, values in columns.items()}
         # Recordings follow each other; each begins its clock anew.
         ends = np.cumsum([0.0] + [s.trials[-1].inputs.clock[-1] for s in self.simulators])
-        self.own_clock = signals['clock']
+        self.own_clock, self.ambient = signals['clock'], signals['ambient']
         self.clock = signals['clock'] + np.repeat(ends[:-1], [len(rows) for rows in self.chosen])
         return {name: values for name, values in signals.items()
                 if np.all(np.isfinite(values)) and np.ptp(values) > 0.0}

@@ -21,13 +21,14 @@ class AmbientTemperature(ThermalEffect):
     shows_in = 'the recorded ambient temperature'
     experiment = 'log the ambient temperature on a cold and on a warm day, and on the bench'
     confused_with = ('ambient_drift',)
+    kinds = ('arm', 'bench')
     needs_column = 'ambient_temperature'
     smallest_change = 0.5
     parameters = (
         Parameter('gain', 'V^2/K', 'd1/d2: drive squared that one kelvin stands for', 0.02, 2.0,
                   0.0, (0.2, 0.6), log=True, scale='drive squared'),
         Parameter('reference', 'degC', 'ambient temperature T0 of the bench', 5.0, 40.0, 25.0,
-                  (23.0,)),)
+                  (23.0,), kinds=('arm',)),)
 
     # What two thermometers, or two places of a room, differ by [K].
     APART = 1.0
@@ -36,13 +37,20 @@ class AmbientTemperature(ThermalEffect):
     def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Give the reference the range that was recorded on the bench, where it was."""
         gain, reference = super().describe(surroundings)
-        if surroundings is None or surroundings.ambient is None:
+        middle = cls.usual(surroundings)
+        if surroundings is None or surroundings.ambient is None or middle is None:
             return gain, reference
         low, high = surroundings.ambient
-        middle = 0.5 * (low + high)
         return gain, dataclasses.replace(
             reference, low=low - cls.APART, high=high + cls.APART, neutral=middle,
             starts=(middle,))
+
+    @classmethod
+    def usual(cls, surroundings: Surroundings | None) -> float | None:
+        """Return the middle of what was recorded on the bench [degC], where it was."""
+        if surroundings is None or surroundings.ambient is None:
+            return None
+        return 0.5 * sum(surroundings.ambient)
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Add what warmer or colder air stands for; nothing where it was not recorded."""

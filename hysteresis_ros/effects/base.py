@@ -319,6 +319,11 @@ class Effect(abc.ABC):
         for name in self.memory:
             setattr(self, name, state[name])
 
+    @classmethod
+    def usual(cls, surroundings: Surroundings | None) -> float | None:
+        """Return what its column had while the model was identified, where that is known."""
+        return None
+
     @property
     def prior_odds(self) -> float:
         """Return the odds, before any data, that it acts in this form over those of any effect."""

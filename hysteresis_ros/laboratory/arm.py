@@ -164,8 +164,7 @@ class Arm:
         return sensors.supply_meter(self.conditions.supply.voltage(self.time), self._rng)
 
     def _room(self) -> float:
-        air = self.conditions.air
-        return air.recorded(self.time) + air.unrecorded(self.time) + self._fluctuation
+        return self.conditions.air.at_wires(self.time) + self._fluctuation
 
     def _step(self, dt: float, voltage: float, moving: bool) -> None:
         conditions = self.conditions

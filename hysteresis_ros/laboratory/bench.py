@@ -16,7 +16,6 @@ import numpy as np
 
 from hysteresis_ros.laboratory import sensors
 from hysteresis_ros.laboratory.conditions import Conditions
-from hysteresis_ros.laboratory.heat import ROOM
 from hysteresis_ros.laboratory.parallel_wires import ParallelWires
 from hysteresis_ros.laboratory.solve import RootFinder
 from hysteresis_ros.laboratory.wire import (
@@ -42,10 +41,15 @@ class Bench:
         Of which the wire's own, its air and its heat balance count.
     seed : int or sequence of int
         Of the sensors' noise and the air's fluctuations.
+
+    Attributes
+    ----------
+    time : float
+        Since the first trial began [s]; trials follow each other.
     """
 
     def __init__(self, conditions: Conditions, seed: int | Sequence[int] = 0) -> None:
-        self.conditions = conditions
+        self.conditions, self.time = conditions, 0.0
         self._muscle = ParallelWires(conditions)
         self._rng = np.random.default_rng(seed)
 
@@ -104,14 +108,15 @@ class Bench:
               tension: float) -> Iterator[float]:
         """Heat and cool, then hold each voltage and yield the tension at its end."""
         conditions, heat, muscle = self.conditions, self.conditions.heat, self._muscle
-        muscle.heat_and_cool(ROOM, tension)
-        temperature = ROOM
+        temperature = conditions.air.at_wires(self.time)
+        muscle.heat_and_cool(temperature, tension)
         muscle.commit(temperature, [tension])
         count = math.ceil(hold / CREEPING_DT) if conditions.creep > 0.0 else 1
         for voltage in np.asarray(voltages, dtype=float).tolist():
-            balance = heat.balance(voltage * voltage, ROOM)
             fluctuation = conditions.air.turbulence * self._rng.standard_normal()
             for _ in range(count):
+                self.time += hold / count
+                balance = heat.balance(voltage * voltage, conditions.air.at_wires(self.time))
                 before = temperature
                 temperature = heat.advance(before, balance + fluctuation, hold / count)
                 muscle.age(voltage, hold / count)

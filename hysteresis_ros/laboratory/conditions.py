@@ -88,6 +88,10 @@ class Air:
         """Return by how much the air at the wires is warmer than that [K]."""
         return self.warming * (1.0 - math.exp(-time / self.warming_time))
 
+    def at_wires(self, time: float) -> float:
+        """Return the temperature of the air at the wires without its fluctuations [degC]."""
+        return self.recorded(time) + self.unrecorded(time)
+
 
 @dataclasses.dataclass
 class Conditions:
