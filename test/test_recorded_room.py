@@ -64,7 +64,8 @@ def verified(table, names):
     """Return the error [m] of the trials that verify, and the effects that were added."""
     force = Measurement.from_columns(experiment_tables('bench', {}, 8701)['force.csv'])
     fitted = {'length_trials': range(len(LOADS)), 'force_trials': [0]}
-    model, added = add_effects(identify(table, force, **fitted).model, table, force, names, **fitted)
+    plain = identify(table, force, **fitted).model
+    model, added = add_effects(plain, table, force, names, **fitted)
     return model.metrics['length']['verification']['rmse'], added
 
 

@@ -24,10 +24,12 @@ from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.forms import with_best_forms
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.located import located
+from hysteresis_ros.diagnosis.observable import observable
 from hysteresis_ros.diagnosis.parameters import universal, usual
 from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.effects import catalogue, Effect
+from hysteresis_ros.effects.ambient import AmbientTemperature
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.effects.thermal_expansion import ThermalExpansion
 from hysteresis_ros.errors import IdentificationError
@@ -62,7 +64,7 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     names : sequence of str, optional
         Effects to add; by default those that the length table proves, and with them those that
         every loaded muscle has, and kinetics, where loads held out show them, and what rows and
-        loads left out show besides.
+        loads left out show besides; and the room's, where that was recorded.
     length_trials, force_trials : sequence of numbers, optional
         Trials that are fitted; the others verify.
     jobs : int
@@ -92,8 +94,10 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     problem = problem_for(model, [fitted], jobs=jobs)
     assert isinstance(problem, BenchProblem)
     if names is None:
-        found = diagnose(model, [fitted], jobs=jobs, progress=progress).effects
-        extended, added = _determined(model, found, problem)
+        room = _recorded_room(problem)
+        found = diagnose(model.with_effects([*model.effects, *room]), [fitted], jobs=jobs,
+                         progress=progress).effects
+        extended, added = _determined(model, [*found, *room], problem)
     elif names:
         extended, added = extended_model(model, names, [fitted])
     else:
@@ -105,6 +109,20 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
     for name, entry in metrics.items():
         metrics[name] = {**extended.metrics.get(name, {}), **entry}
     return dataclasses.replace(extended, metrics=metrics), added
+
+
+def _recorded_room(problem: BenchProblem) -> list[Effect]:
+    """
+    Return what the room typically does, where its temperature was recorded and has changed.
+
+    Nobody has to prove that a room acts. While other effects are sought, it is taken to be as
+    large as is usual: else what the load does would stand for it.
+    """
+    surroundings = problem.model.surroundings
+    reference = AmbientTemperature.usual(surroundings)
+    if reference is None or AmbientTemperature.id not in observable(problem)[0]:
+        return []
+    return [AmbientTemperature.typical(surroundings, reference)]
 
 
 def _determined(model: MuscleModel, found: Sequence[Effect], problem: BenchProblem

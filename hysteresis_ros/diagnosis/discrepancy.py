@@ -42,7 +42,6 @@ from hysteresis_ros.effects import (
     DriveEffect, Effect, Inputs, MaterialEffect, Parameter, Surroundings)
 from hysteresis_ros.effects.ambient import AmbientTemperature
 from hysteresis_ros.effects.base import Values
-from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.formation_memory import FormationMemory
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.identification.bench_metrics import SHIFT
@@ -468,11 +467,9 @@ def room_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """
     surroundings = problem.model.surroundings
     recorded = problem.ambient[np.isfinite(problem.ambient)]
-    if (not len(recorded) or surroundings.drive not in (*ELECTRIC_DRIVES, 'power')
+    if (not len(recorded) or not AmbientTemperature.available(surroundings)
             or any(effect.id == AmbientTemperature.id for effect in effects)):
         return np.zeros(len(problem.measured))
     bench = AmbientTemperature.usual(surroundings)
-    typical = AmbientTemperature(
-        surroundings, gain=surroundings.full_drive_squared / FULL_HEAT,
-        reference=float(np.mean(recorded)) if bench is None else bench)
-    return _change_by(typical, problem, effects)
+    return _change_by(AmbientTemperature.typical(
+        surroundings, float(np.mean(recorded)) if bench is None else bench), problem, effects)

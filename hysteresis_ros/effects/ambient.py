@@ -8,7 +8,11 @@ import math
 import numpy as np
 
 from hysteresis_ros.effects.base import Inputs, Parameter, Surroundings, Values
+from hysteresis_ros.effects.electrical import ELECTRIC_DRIVES
 from hysteresis_ros.effects.thermal import ThermalEffect
+
+# By how much the full drive heats a muscle above the room [K], about.
+FULL_HEAT = 80.0
 
 
 class AmbientTemperature(ThermalEffect):
@@ -51,6 +55,17 @@ class AmbientTemperature(ThermalEffect):
         if surroundings is None or surroundings.ambient is None:
             return None
         return 0.5 * sum(surroundings.ambient)
+
+    @classmethod
+    def available(cls, surroundings: Surroundings) -> bool:
+        """Whether the drive heats: a muscle's own temperature has the room in it."""
+        return surroundings.drive in (*ELECTRIC_DRIVES, 'power')
+
+    @classmethod
+    def typical(cls, surroundings: Surroundings, reference: float) -> 'AmbientTemperature':
+        """Return what a room usually does, against one that is as warm as `reference` [degC]."""
+        return cls(surroundings, gain=surroundings.full_drive_squared / FULL_HEAT,
+                   reference=reference)
 
     def forward(self, signal: Values, inputs: Inputs, surroundings: Surroundings) -> Values:
         """Add what warmer or colder air stands for; nothing where it was not recorded."""
