@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hysteresis_ros.diagnosis.fitted_sets import FittedSets, subsets
-from hysteresis_ros.effects import Effect
+from hysteresis_ros.diagnosis.fitted_sets import FittedSets
+from hysteresis_ros.effects import catalogue, Effect
 from hysteresis_ros.workers import map_in_forks
 
 if TYPE_CHECKING:
@@ -121,11 +121,15 @@ class SetFitter:
         """
         Fit what remains of the most probable sets without any one of their effects.
 
-        Again, where it has less error at once than its own fit: that has ended in a local minimum,
-        out of which the further effect has led, whether it acts or not.
+        Or with the equation that one of them contains. Again, where it has less error at once than
+        its own fit: that has ended in a local minimum, out of which the further effect has led,
+        whether it acts or not.
         """
         for _ in range(self.settings.most_effects):
-            starts = [effects for names in self.sets.valid()[:self.settings.beam]
+            # The most probable of all may have an effect that is too small to be an answer.
+            probable = dict.fromkeys([*self.sets.valid()[:self.settings.beam],
+                                      *self.sets.ranked()[:1]])
+            starts = [effects for names in probable
                       for effects in self._worth_fitting_without(names)]
             if not starts:
                 return
@@ -134,8 +138,8 @@ class SetFitter:
     def _worth_fitting_without(self, names: frozenset[str]) -> list[list[Effect]]:
         """Return what a set holds without any one effect, where that is to be fitted from there."""
         fit, starts = self.sets.fits[names], []
-        for fewer in filter(None, subsets(names)):
-            effects = [effect for effect in fit.effects if effect.id in fewer]
+        for effects in self._with_less(fit.effects):
+            fewer = frozenset(effect.id for effect in effects)
             if self._reduced.get((names, fewer)) is fit.predicted:
                 continue
             if fewer in self.sets.fits:
@@ -145,3 +149,17 @@ class SetFitter:
             self._reduced[names, fewer] = fit.predicted
             starts.append(effects)
         return starts
+
+    def _with_less(self, effects: Sequence[Effect]) -> Iterator[list[Effect]]:
+        """Give effects without any one of them, and with what one of their equations contains."""
+        problem = self.fitter.problem
+        for effect in effects:
+            others = [other for other in effects if other is not effect]
+            if others:
+                yield others
+            for name in effect.replaces:
+                if problem.catalogue is not None and name not in problem.catalogue:
+                    continue
+                simpler = catalogue()[name](problem.model.surroundings)
+                yield [*others, simpler.with_values(**{
+                    key: value for key, value in effect.values.items() if key in simpler.values})]
