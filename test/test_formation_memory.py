@@ -27,16 +27,16 @@ from model_support import (
 KEPT = 0.8
 
 
-def keeping(*names, kept=KEPT, cooled=1.0, **changes):
+def keeping(*names, kept=KEPT, cooled=1.0, anew=0.0, **changes):
     """Return a model whose strain grows with the load, and is kept, with other effects by name."""
     model = bicep_model(('stress_dependent_strain', *names), **changes)
-    memory = effect_of(model, 'formation_memory', kept=kept, cooled=cooled)
+    memory = effect_of(model, 'formation_memory', kept=kept, cooled=cooled, anew=anew)
     return model.with_effects([*model.effects, memory])
 
 
-def balance(*names, kept=KEPT, cooled=1.0):
+def balance(*names, kept=KEPT, cooled=1.0, anew=0.0):
     """Return the arm of that model."""
-    model = keeping(*names, kept=kept, cooled=cooled)
+    model = keeping(*names, kept=kept, cooled=cooled, anew=anew)
     return model.balance(model.chain())
 
 
@@ -61,12 +61,45 @@ def test_martensite_keeps_the_strain_with_which_it_formed():
     """In thirds under growing loads; it goes back with the mean strain, whatever the load then."""
     outputs = np.array([1.0, 1.0, 2.0, 3.0, 3.0, 1.5, 0.0, 1.0, 0.4, 0.9])
     scales = np.array([1.0, 1.0, 2.0, 3.0, 9.0, 9.0, 1.0, 1.0, 4.0, 2.0])
-    kept = elongations(1.0, outputs, scales)
+    kept = elongations(1.0, False, outputs, scales)
     np.testing.assert_allclose(kept[:8], [1.0, 1.0, 2.5, 5.0, 5.0, 2.5, 0.0, 1.0])
     np.testing.assert_allclose(kept, integral(outputs, scales), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(elongations(0.3, outputs, scales),
+    np.testing.assert_allclose(elongations(0.3, False, outputs, scales),
                                0.7 * scales * outputs + 0.3 * kept)
-    np.testing.assert_array_equal(elongations(0.0, outputs, scales), scales * outputs)
+    np.testing.assert_array_equal(elongations(0.0, False, outputs, scales), scales * outputs)
+
+
+def test_a_heavier_load_orients_what_has_formed_from_the_next_sample_on():
+    """A lighter one does not undo that; what goes back takes the larger strain along."""
+    outputs = np.array([2.0, 2.0, 2.0, 2.0, 2.0, 1.0, 3.0, 0.0, 1.0])
+    scales = np.array([1.0, 3.0, 3.0, 1.0, 2.0, 1.0, 3.0, 1.0, 1.0])
+    # From 2 at 1 to 6 at 3, half of it back; 2 more at 2 on average are less than all at 3.
+    np.testing.assert_allclose(elongations(1.0, True, outputs, scales),
+                               [2.0, 2.0, 6.0, 6.0, 6.0, 3.0, 7.0, 0.0, 1.0])
+    np.testing.assert_allclose(elongations(0.25, True, outputs, scales)[:4], [
+        2.0, 0.75 * 6.0 + 0.25 * 2.0, 6.0, 0.75 * 2.0 + 0.25 * 6.0])
+    # Where the load only falls while martensite forms, as on an arm that cools, nothing is new.
+    falling = np.linspace(3.0, 1.0, 30)
+    np.testing.assert_array_equal(*(elongations(1.0, anew, np.linspace(0.0, 2.0, 30), falling)
+                                    for anew in (False, True)))
+
+
+@pytest.mark.parametrize('names', [(), ('viscous_friction',), ('unequal_muscles',)])
+def test_an_arm_that_friction_holds_rests_lower_once_it_was_heated_a_little(names):
+    """The load grows until friction turns, which stretches the cold wire; heat undoes that."""
+    rests = {}
+    for anew in (0.0, 1.0):
+        model = keeping(*names, anew=anew)
+        model = model.with_effects([
+            *model.effects, effect_of(model, 'coulomb_friction', tau_c=0.05)])
+        made = model.balance(model.chain())
+        begun = made.settle(0.5)
+        for ways in ((0.5, 6.0, 0.5), (0.5, 40.0, 0.5)):
+            for x in np.concatenate([np.linspace(*two, 1000) for two in zip(ways, ways[1:])]):
+                rest = made.step(float(x), 30.0)
+            rests[anew, max(ways)] = np.degrees(rest - begun)
+    assert rests[1.0, 6.0] > 0.8 and abs(rests[0.0, 6.0]) < 0.1
+    assert abs(rests[1.0, 40.0]) < 0.2 and abs(rests[0.0, 40.0]) < 0.2
 
 
 def expected_length(model, made, x):
@@ -128,7 +161,8 @@ def test_the_angle_is_that_of_brute_force():
     for x in (3.0, 8.0, 11.0, 6.0, 4.5, 9.0):
         def gap(theta):
             scale = float(chain.scale(np.float64(load(theta))))
-            kept = elongations(KEPT, np.array([*outputs, stage.peek(load(theta) - x) - base]),
+            given = stage.peek(load(theta) - x) - base
+            kept = elongations(KEPT, False, np.array([*outputs, given]),
                                np.array([*scales, scale]))[-1]
             return base + kept - float(GEOMETRY.length(theta))
         theta = made.step(x, 30.0)
@@ -205,9 +239,10 @@ def test_where_nothing_is_kept_nothing_changes(names):
         flat.predict(run))
 
 
+@pytest.mark.parametrize('anew', [0.0, 1.0])
 @pytest.mark.parametrize('names', [(), ('coulomb_friction',), ('unequal_muscles',)])
-def test_a_state_comes_back_with_what_is_kept(names):
-    made = balance(*names)
+def test_a_state_comes_back_with_what_is_kept(names, anew):
+    made = balance(*names, anew=anew)
     made.settle(0.5)
     for x in (9.0, 5.0):
         made.step(x, 30.0)
@@ -218,7 +253,7 @@ def test_a_state_comes_back_with_what_is_kept(names):
     assert [made.step(x, 30.0) for x in way] == first
     assert [other.step(x, 30.0) for x in way] == first
     made.settle(0.5)
-    again = balance(*names)
+    again = balance(*names, anew=anew)
     again.settle(0.5)
     assert made.step(6.0, 30.0) == pytest.approx(again.step(6.0, 30.0), abs=1e-8)
 
@@ -226,8 +261,9 @@ def test_a_state_comes_back_with_what_is_kept(names):
 @pytest.mark.parametrize('names', [
     (), ('series_compliance', 'cable_friction'), ('unequal_muscles', 'coulomb_friction'),
     ('transformation_slopes',), ('fatigue',)])
-def test_the_inverse_brings_the_arm_to_its_targets(names):
-    model = keeping(*names)
+@pytest.mark.parametrize('anew', [0.0, 1.0])
+def test_the_inverse_brings_the_arm_to_its_targets(names, anew):
+    model = keeping(*names, anew=anew)
     assert np.max(misses_of_targets(model)) < 0.001
     controller = bicep_model(('stress_dependent_strain', *names)).controller(arm=True)
     observer, missed = model.observer(), []

@@ -68,7 +68,8 @@ def wires_of(operator: HysteresisOperator, chain: Chain, loaded: bool = True
     typical = COMPLIANCE * chain.surroundings.over_paper('compliance')
     return (Wires(table, operator.output_range[0], offsets, own or typical,
                   1e-10 * (operator.upper - operator.lower), scales, widths, oriented, lightest,
-                  spacing, orients, own > 0.0, kept, chain.cooled_on_arm), operators, memories)
+                  spacing, orients, own > 0.0, kept, chain.oriented_anew, chain.cooled_on_arm),
+            operators, memories)
 
 
 def with_own_memories(operators: Sequence[HysteresisOperator]

@@ -60,8 +60,8 @@ DIRECTIONAL = 0.5
 SHARE, SHARE_SPREAD = 1.0 / math.sqrt(3.0), 1.0 / math.sqrt(12.0)
 # Effects of which no bench tells the share, as the first `Discrepancy.courses` have them.
 COURSES: tuple[type[Effect], ...] = (FormationMemory, Kinetics)
-# By how much the full drive heats a muscle above the room [K], about.
-FULL_HEAT = 80.0
+# Of the courses those of a changing load, of which the share may differ from place to place.
+FROM_LOADS = [3, 4]
 # Of as many loads one lies between others, and tells what the model does between them.
 FEWEST_LOADS = 3
 
@@ -90,8 +90,9 @@ class Discrepancy:
         What the response would change by, each with a share from none to all, which is an error of
         all rows together. On an arm: if martensite kept all of its strain; if all of it followed
         the kinetics of `Kinetics`; if martensite kept all of its strain, but each trial began with
-        what the load at rest orients and not with what forms on the way down to rest; and if the
-        present load had acted all along (`LoadHistory.path`).
+        what the load at rest orients and not with what forms on the way down to rest; what it would
+        change besides if a heavier load oriented martensite anew; and if the present load had acted
+        all along (`LoadHistory.path`).
     equations : ndarray, shape (n, e)
         The same as `parts`, for the equations of effects.
     """
@@ -340,13 +341,14 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     if thresholds:
         bench = np.hypot(bench, length * thresholds * drive_sensitivity(problem, effects))
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
+    known = {*tried, *(effect.id for effect in effects)}
+    courses = np.column_stack([_courses_along(problem, effects, known), history.path])
     parts = np.column_stack([bench, DIRECTIONAL * direction * bench,
-                             SHARE_SPREAD * history.path, kinetics_spread(problem, effects)])
+                             SHARE_SPREAD * courses[:, FROM_LOADS],
+                             kinetics_spread(problem, effects)])
     common = left_out_changes(problem, effects)
     if room:
         common = np.column_stack([common, room_change(problem, effects)])
-    known = {*tried, *(effect.id for effect in effects)}
-    courses = np.column_stack([_courses_along(problem, effects, known), history.path])
     return Discrepancy(
         parts, np.column_stack([way_done(drive, predicted, problem.trial), unit(predicted)])
         / settings.correlation, common, courses, np.zeros((len(predicted), 0)))
@@ -354,15 +356,16 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
 
 def _courses_along(problem: ArmProblem, effects: Sequence[Effect], known: Collection[str]
                    ) -> np.ndarray:
-    """Return the `courses` but for the last one, shape (n, 3); 0 for effects that are `known`."""
+    """Return the `courses` but for the last one, shape (n, 4); 0 for effects that are `known`."""
     kept, kinetics = (
         np.zeros(len(problem.measured)) if kind.id in known or not kind.available(
             problem.model.surroundings) else course_of(kind, problem, effects)
         for kind in COURSES)
-    hung_cold = kept
+    hung_cold = anew = kept
     if np.any(kept):
-        hung_cold = course_of(FormationMemory, problem, effects, cooled=0.0)
-    return np.column_stack([kept, kinetics, hung_cold])
+        hung_cold, anew = (course_of(FormationMemory, problem, effects, **form)
+                           for form in ({'cooled': 0.0}, {'anew': 1.0}))
+    return np.column_stack([kept, kinetics, hung_cold, anew - kept])
 
 
 def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect],

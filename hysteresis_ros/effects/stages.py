@@ -82,6 +82,8 @@ class MaterialEffect(Effect):
     follows_strain: float = 0.0
     # Share, 0 to 1, of its strain that martensite keeps from the load under which it formed.
     keeps_strain: float = 0.0
+    # Whether a load heavier than that one orients it anew.
+    oriented_anew: bool = False
     # Whether the martensite that a trial begins with formed while the arm cooled down; else under
     # the load at rest.
     cooled_on_arm: bool = True

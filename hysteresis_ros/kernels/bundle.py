@@ -45,8 +45,9 @@ class Wires(NamedTuple):
     that of H2, at loads `spacing` [N] apart from `lightest` on, as the transformation feels them.
     `oriented` (m,) is the share of what forms that these loads orient, where `orients` says that it
     counts (see `kinetics`). `elastic` says whether the compliance is the wires' own, not a typical
-    one. `kept` is the share of the strain that martensite keeps (see `formation`), `cooled` whether
-    what is there at the start formed on the way down to rest.
+    one. `kept` is the share of the strain that martensite keeps (see `formation`), `anew` whether a
+    heavier load orients it anew, and `cooled` whether what is there at the start formed on the way
+    down to rest.
     """
 
     table: np.ndarray
@@ -62,6 +63,7 @@ class Wires(NamedTuple):
     orients: bool
     elastic: bool
     kept: float
+    anew: bool
     cooled: bool
 
 
@@ -196,7 +198,7 @@ def commit(wires: Wires, memories: np.ndarray, muscles: np.ndarray, x: float) ->
         step(wires.table, memories[i], input_for(wires, memories[i], v, x))
         if wires.kept != 0.0:
             keep(muscles, i, last_output(wires.table, memories[i]) - wires.base,
-                 scale_at(wires, v + x))
+                 scale_at(wires, v + x), wires.anew)
 
 
 @lean
@@ -252,5 +254,5 @@ def respond(wires: Wires, memories: np.ndarray, search: np.ndarray, x: float, lo
         following[i, LOAD] = u
         if wires.kept != 0.0:
             keep(following, i, peek(wires.table, memories[i], u) - wires.base,
-                 scale_at(wires, v + x))
+                 scale_at(wires, v + x), wires.anew)
     return output

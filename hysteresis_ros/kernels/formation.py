@@ -1,7 +1,7 @@
 # Copyright 2026 hysteresis_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What martensite keeps of the load under which it formed.
+What martensite keeps of the load under which it formed, or that has oriented it since.
 
 What is added has the strain of its moment; what goes back takes the mean strain along, as in the
 unified model of Lagoudas and others, Int. J. Plasticity 32-33 (2012) 155. With P the elongation of
@@ -10,7 +10,10 @@ output of H2 above its least::
 
     dP = S(F) dy  where y grows,    dP = P dy / y  where it falls
 
-While y grows, S is taken to change evenly with it from one sample to the next.
+While y grows, S is taken to change evenly with it from one sample to the next. Where a load that is
+heavier than that one orients the martensite anew, P is never less than S(F) y, from the sample
+after the one with that load on (detwinning: Popov and Lagoudas, Int. J. Plasticity 23 (2007) 1679;
+Chemisky and others, Mech. Mater. 43 (2011) 361).
 """
 
 import numpy as np
@@ -56,10 +59,15 @@ def parts(kept: float, muscles: np.ndarray, i: int, output: float) -> tuple[floa
 
 
 @lean
-def keep(muscles: np.ndarray, i: int, output: float, scale: float) -> None:
-    """Remember an output y [m] of a muscle, reached under a load with the factor S(F)."""
+def keep(muscles: np.ndarray, i: int, output: float, scale: float, anew: bool) -> None:
+    """
+    Remember an output y [m] of a muscle, reached under a load with the factor S(F).
+
+    With `anew`, a heavier load than that of its formation orients martensite.
+    """
     strained, held = parts(1.0, muscles, i, output)
-    muscles[i, FORMED] = scale * strained + held
+    formed = scale * strained + held
+    muscles[i, FORMED] = max(formed, scale * output) if anew else formed
     muscles[i, SCALE], muscles[i, OUTPUT] = scale, output
 
 
@@ -76,7 +84,7 @@ def output_for(kept: float, muscles: np.ndarray, i: int, wanted: float, scale: f
 
 
 @jit
-def elongations(kept: float, outputs: np.ndarray, scales: np.ndarray) -> np.ndarray:
+def elongations(kept: float, anew: bool, outputs: np.ndarray, scales: np.ndarray) -> np.ndarray:
     """
     Return the elongation by the transformation, of which martensite keeps a share.
 
@@ -84,6 +92,8 @@ def elongations(kept: float, outputs: np.ndarray, scales: np.ndarray) -> np.ndar
     ----------
     kept : float
         That share.
+    anew : bool
+        Whether a heavier load orients it anew.
     outputs, scales : ndarray, shape (rows,)
         Output of H2 above its least, and S(F) of each row.
 
@@ -97,5 +107,5 @@ def elongations(kept: float, outputs: np.ndarray, scales: np.ndarray) -> np.ndar
     for n in range(len(outputs)):
         strained, held = parts(kept, muscles, 0, outputs[n])
         found[n] = scales[n] * strained + held
-        keep(muscles, 0, outputs[n], scales[n])
+        keep(muscles, 0, outputs[n], scales[n], anew)
     return found

@@ -48,7 +48,7 @@ def settle(arm: Arm, state: State, line: int, x: float, offset: float, factor: f
     output = last_output(table, memory) - arm.base
     k, share = _place(arm, state, line, output, offset, factor)
     if arm.wires.kept != 0.0:
-        keep(state.muscles, 0, output, factor_at(arm, line, k, share))
+        keep(state.muscles, 0, output, factor_at(arm, line, k, share), arm.wires.anew)
     return k, share
 
 

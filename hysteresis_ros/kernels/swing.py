@@ -72,7 +72,7 @@ def swing(arm: Arm, state: State, x: float, offset: float, factor: float, fricti
     if arm.wires.kept != 0.0:
         n, part = _load_at(arm, state, u, x)
         keep(state.muscles, 0, last_output(table, memory) - arm.base,
-             grid.between(arm.loads, SCALE, n, max(part, 0.0)))
+             grid.between(arm.loads, SCALE, n, max(part, 0.0)), arm.wires.anew)
     return k, share
 
 

@@ -225,6 +225,11 @@ class Chain:
         return min(sum((effect.keeps_strain for effect in self.material), 0.0), 1.0)
 
     @property
+    def oriented_anew(self) -> bool:
+        """Whether a load heavier than that of its formation orients martensite anew."""
+        return any(effect.oriented_anew for effect in self.material)
+
+    @property
     def cooled_on_arm(self) -> bool:
         """Whether what a trial begins with formed while the arm cooled down."""
         return all(effect.cooled_on_arm for effect in self.material)

@@ -43,6 +43,7 @@ class SecondStage:
         self._bundle = Bundle(operator, chain, loaded) if len(chain.offsets) > 1 else None
         self._operators = self._bundle.operators if self._bundle else [copy.deepcopy(operator)]
         self._kept, self._orients = chain.keeps_strain, chain.orients
+        self._anew = chain.oriented_anew
         # The columns of `kernels.formation`, for each muscle.
         self._muscles = (self._bundle.muscles if self._bundle
                          else np.zeros((1, formation.SIZE)))
@@ -137,7 +138,7 @@ class SecondStage:
             return output, following
         given, scale = output - self.base, self._scale(load)
         strained, kept = formation.parts(self._kept, self._muscles, 0, given)
-        formation.keep(following, 0, given, scale)
+        formation.keep(following, 0, given, scale, self._anew)
         return self.base + strained + kept / scale, following
 
     def _orient(self, *oriented: float) -> None:

@@ -379,7 +379,7 @@ class Simulator:
         scale, kept = chain.scale(trial.load), chain.keeps_strain
         if kept:
             transformed = factor * elongations(
-                kept, np.concatenate(([rest], output)) - base,
+                kept, chain.oriented_anew, np.concatenate(([rest], output)) - base,
                 np.concatenate((scale[:1], scale)))[1:]
         else:
             transformed = scale * factor * (output - base)
