@@ -4,7 +4,7 @@
 
 import dataclasses
 
-from model_support import bicep_model, effect_of
+from model_support import bicep_model, effect_of, runs
 import pytest
 from selection_support import recording, selection, TRIED
 
@@ -112,3 +112,46 @@ def test_a_set_that_was_fitted_better_since_is_a_start_without_its_effects_again
     assert (begun(), begun()) == ([2.0], [])
     found.sets.fits[names] = late
     assert (begun(), begun()) == ([15.0], [])
+
+
+@pytest.fixture(scope='module')
+def lagging(model):
+    """Return what a recording of an arm that lags behind, and is 15 g heavier, shows."""
+    effects = [effect_of(model, 'thermal_lag', time_constant=4.0),
+               effect_of(model, 'payload_error', dm=15.0)]
+    return selection(model, runs(model.with_effects(effects), rows=60, dt=1.0),
+                     ['thermal_lag', 'heating_cooling_asymmetry', 'payload_error'])
+
+
+@pytest.mark.parametrize('answer', [True, False])
+def test_a_simpler_equation_begins_where_the_one_that_contains_it_has_ended(
+        model, lagging, monkeypatch, answer):
+    """Of the most probable set also where that is no answer, as fewer effects suffice."""
+    found = lagging
+    payload = effect_of(model, 'payload_error', dm=15.0)
+    both = [effect_of(model, 'heating_cooling_asymmetry', time_constant=4.0, ratio=1.01),
+            payload]
+    best, = found.fitter.fit([both], found.fitting.metric, 0)
+    stuck, = found.fitter.fit([[effect_of(model, 'thermal_lag', time_constant=1.0), payload]],
+                              found.fitting.metric, 0)
+    best, simple = found.fitter.along(best), frozenset(stuck.names)
+    monkeypatch.setattr(found.sets, 'fits', {
+        frozenset(): found.sets.base, simple: found.fitter.along(stuck),
+        frozenset(best.names): best})
+    found.sets.keep_least(simple, stuck.predicted)
+    assert found.sets.ranked()[0] == frozenset(best.names)
+    monkeypatch.setattr(found.sets, 'valid', lambda: [frozenset(best.names)] if answer else [])
+    found.fitting.refine_best()
+    lag = next(one for one in found.sets.fits[simple].effects if one.id == 'thermal_lag')
+    assert lag.time_constant == pytest.approx(4.0, rel=0.02)
+
+
+def test_a_simpler_equation_that_nobody_asked_for_is_not_fitted(model, lagging, monkeypatch):
+    both = [effect_of(model, 'heating_cooling_asymmetry'), effect_of(model, 'payload_error')]
+
+    def names():
+        return [[one.id for one in effects] for effects in lagging.fitting._with_less(both)]
+    alone = [['payload_error'], ['heating_cooling_asymmetry']]
+    assert names() == [alone[0], ['payload_error', 'thermal_lag'], alone[1]]
+    monkeypatch.setattr(lagging.problem, 'catalogue', ('heating_cooling_asymmetry',))
+    assert names() == alone
