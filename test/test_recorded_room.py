@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from hysteresis_ros.diagnosis import selection
+from hysteresis_ros.diagnosis import bench_effects, selection
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, room_change, room_is_calm
@@ -228,6 +228,31 @@ def test_a_bench_says_how_much_its_recorded_room_counts():
     # In the laboratory 36 V^2 heat by 97 K.
     assert room.gain == pytest.approx(36.0 / 97.0, rel=0.15)
     assert 'gain' in room.intervals and 'reference' not in room.intervals
+
+
+class Asked(Exception):
+    """What was asked of a diagnosis that nobody has the time for."""
+
+
+@pytest.mark.parametrize('swing, recorded, counts', [
+    (3.0, True, True), (3.0, False, False), (0.1, True, False)])
+def test_a_recorded_room_acts_while_a_bench_is_diagnosed(monkeypatch, swing, recorded, counts):
+    """As strongly as is usual: what the load does would else stand for it."""
+    table = bench_in_room(swing, random=(False,))
+    if not recorded:
+        table = without_thermometer(table)
+
+    def diagnose_nothing(model, *args, **options):
+        raise Asked(model)
+    monkeypatch.setattr(bench_effects, 'diagnose', diagnose_nothing)
+    with pytest.raises(Asked) as asked:
+        add_effects(identify(table).model, table)
+    model, = asked.value.args
+    assert [effect.id for effect in model.effects] == ['ambient_temperature'] * counts
+    for effect in model.effects:
+        assert effect.gain == pytest.approx(36.0 / 80.0)
+        assert effect.reference == pytest.approx(
+            np.mean([f(table.column('ambient_temperature')) for f in (np.min, np.max)]))
 
 
 @pytest.mark.long

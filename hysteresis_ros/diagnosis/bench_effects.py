@@ -119,7 +119,7 @@ def _recorded_room(problem: BenchProblem) -> list[Effect]:
     large as is usual: else what the load does would stand for it.
     """
     surroundings = problem.model.surroundings
-    reference = AmbientTemperature.usual(surroundings)
+    reference = AmbientTemperature.column_on_bench(surroundings)
     if reference is None or AmbientTemperature.id not in observable(problem)[0]:
         return []
     return [AmbientTemperature.typical(surroundings, reference)]

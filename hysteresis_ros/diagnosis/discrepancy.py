@@ -473,6 +473,6 @@ def room_change(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     if (not len(recorded) or not AmbientTemperature.available(surroundings)
             or any(effect.id == AmbientTemperature.id for effect in effects)):
         return np.zeros(len(problem.measured))
-    bench = AmbientTemperature.usual(surroundings)
+    bench = AmbientTemperature.column_on_bench(surroundings)
     return _change_by(AmbientTemperature.typical(
         surroundings, float(np.mean(recorded)) if bench is None else bench), problem, effects)

@@ -56,7 +56,7 @@ def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
         column = effect.needs_column
         if effect.needs_transients and problem.settled:
             unobservable[name] = 'every row is settled'
-        elif column and not (recorded_range(problem, column, effect.usual(surroundings))
+        elif column and not (recorded_range(problem, column, effect.column_on_bench(surroundings))
                              > effect.smallest_change):
             unrecorded[name] = f'{column} was not recorded or did not change'
         else:
@@ -64,18 +64,18 @@ def observable(problem: Problem) -> tuple[list[str], dict[str, str]]:
     return names, {**unobservable, **unrecorded, **elsewhere}
 
 
-def recorded_range(problem: Problem, column: str, usual: float | None = None) -> float:
+def recorded_range(problem: Problem, column: str, on_bench: float | None = None) -> float:
     """
     Return the range of a recorded column over all recordings; 0 where it was not recorded.
 
-    With what the model was identified at, `usual`, where that is known.
+    With what the model was identified at, `on_bench`, where that is known.
     """
     values = np.concatenate([np.zeros(0), *(
         m.columns[column] for m in problem.measurements if column in m.columns)])
     values = values[np.isfinite(values)]
     if not len(values):
         return 0.0
-    return float(np.ptp(values if usual is None else [*values, usual]))
+    return float(np.ptp(values if on_bench is None else [*values, on_bench]))
 
 
 def present(model: MuscleModel, kind: type[Effect], settled: bool) -> Effect:

@@ -41,7 +41,7 @@ class AmbientTemperature(ThermalEffect):
     def describe(cls, surroundings: Surroundings | None) -> tuple[Parameter, ...]:
         """Give the reference the range that was recorded on the bench, where it was."""
         gain, reference = super().describe(surroundings)
-        middle = cls.usual(surroundings)
+        middle = cls.column_on_bench(surroundings)
         if surroundings is None or surroundings.ambient is None or middle is None:
             return gain, reference
         low, high = surroundings.ambient
@@ -50,7 +50,7 @@ class AmbientTemperature(ThermalEffect):
             starts=(middle,))
 
     @classmethod
-    def usual(cls, surroundings: Surroundings | None) -> float | None:
+    def column_on_bench(cls, surroundings: Surroundings | None) -> float | None:
         """Return the middle of what was recorded on the bench [degC], where it was."""
         if surroundings is None or surroundings.ambient is None:
             return None

@@ -320,7 +320,7 @@ class Effect(abc.ABC):
             setattr(self, name, state[name])
 
     @classmethod
-    def usual(cls, surroundings: Surroundings | None) -> float | None:
+    def column_on_bench(cls, surroundings: Surroundings | None) -> float | None:
         """Return what its column had while the model was identified, where that is known."""
         return None
 
