@@ -239,6 +239,19 @@ def test_where_nothing_is_kept_nothing_changes(names):
         flat.predict(run))
 
 
+def test_what_branches_have_oriented_is_kept_by_them():
+    """Kept once more, a partial cycle under a falling load sent the arm to its dead centre."""
+    model = bicep_model(('stress_dependent_strain', 'phase_modulus'))
+    run = arm_run(wandering_voltage(40, seed=3), 0.1)
+    for orients in (0.0, 1.0):
+        oriented = model.with_effects([
+            *model.effects, effect_of(model, 'kinetics', share=1.0, orients=orients)])
+        keeping_too = oriented.with_effects([
+            *oriented.effects, effect_of(model, 'formation_memory', kept=1.0)])
+        same = np.array_equal(keeping_too.predict(run), oriented.predict(run))
+        assert same == (orients == 1.0)
+
+
 @pytest.mark.parametrize('anew', [0.0, 1.0])
 @pytest.mark.parametrize('names', [(), ('coulomb_friction',), ('unequal_muscles',)])
 def test_a_state_comes_back_with_what_is_kept(names, anew):

@@ -219,8 +219,12 @@ class Chain:
 
     @property
     def keeps_strain(self) -> float:
-        """Share, 0 to 1, of its strain that martensite keeps; 0 where no load changes it."""
-        if not (self._scaling or self._elastic):
+        """
+        Share, 0 to 1, of its strain that martensite keeps; 0 where no load changes it.
+
+        And where branches orient martensite: what is oriented then stays so whatever the load.
+        """
+        if not (self._scaling or self._elastic) or self.orients:
             return 0.0
         return min(sum((effect.keeps_strain for effect in self.material), 0.0), 1.0)
 
