@@ -97,7 +97,10 @@ def add_effects(model: MuscleModel, length: Measurement, force: Measurement | No
         room = _recorded_room(problem)
         found = diagnose(model.with_effects([*model.effects, *room]), [fitted], jobs=jobs,
                          progress=progress).effects
-        extended, added = _determined(model, [*found, *room], problem)
+        if room:
+            fitter = BenchFitter(problem.finer())
+            found = fitter.with_intervals(fitter.fit([*found, *room]))
+        extended, added = _determined(model, found, problem)
     elif names:
         extended, added = extended_model(model, names, [fitted])
     else:
