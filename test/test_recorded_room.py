@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A room whose temperature was recorded: what it explains, and what it must not take up."""
 
+import types
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,9 @@ from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.discrepancy import discrepancy_along, room_change, room_is_calm
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.observable import observable
+from hysteresis_ros.diagnosis.parameters import usual
 from hysteresis_ros.diagnosis.settings import Settings
+from hysteresis_ros.effects import catalogue
 from hysteresis_ros.effects.ambient import AmbientTemperature
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.laboratory import sequences
@@ -253,6 +257,26 @@ def test_a_recorded_room_acts_while_a_bench_is_diagnosed(monkeypatch, swing, rec
         assert effect.gain == pytest.approx(36.0 / 80.0)
         assert effect.reference == pytest.approx(
             np.mean([f(table.column('ambient_temperature')) for f in (np.min, np.max)]))
+
+
+def test_a_rooms_gain_is_fitted_with_what_was_found(monkeypatch):
+    """Before anything is taken away again; nothing else fits it where nothing is."""
+    table = bench_in_room(3.0, random=(False,))
+    surroundings = identify(table).model.surroundings
+    own = usual([catalogue()[name](surroundings) for name in (
+        'stress_dependence', 'series_compliance', 'stress_dependent_strain')], 'bench')
+
+    def determine_nothing(model, found, problem):
+        raise Asked(found)
+    monkeypatch.setattr(bench_effects, 'diagnose',
+                        lambda *args, **options: types.SimpleNamespace(effects=own))
+    monkeypatch.setattr(bench_effects, '_determined', determine_nothing)
+    with pytest.raises(Asked) as asked:
+        add_effects(identify(table).model, table)
+    found, = asked.value.args
+    assert [effect.id for effect in found] == [*(one.id for one in own), 'ambient_temperature']
+    assert found[-1].gain == pytest.approx(36.0 / 97.0, rel=0.15)
+    assert set(found[-1].intervals) == {'gain'}
 
 
 @pytest.mark.long

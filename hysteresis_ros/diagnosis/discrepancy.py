@@ -17,9 +17,10 @@ It is known before the arm moves. With effects, their equations may be off as we
 * The bench holds the load still, while an arm's load moves with the wire: what a load does in the
   middle of a transformation the bench cannot tell. Models that agree on every bench table bound
   that. One of them feels the present load alone (`load_history`), in another one martensite keeps
-  the strain of the load under which it formed. By what share each is right is about the same for
-  the whole wire, so that all rows err together; of the load's own mark it may differ from place to
-  place. Where martensite's memory is tried, it speaks for itself.
+  the strain of the load under which it formed, and a heavier one may orient it anew. By what share
+  each is right is about the same for the whole wire, so that all rows err together; of the load's
+  own mark, and of what is oriented anew, it may differ from place to place. Where martensite's
+  memory is tried, it speaks for itself.
 * A bench goes through few minor loops, which weights can follow whatever their kind. In one more
   model that agrees with it, what transforms is in proportion to what has still to (`kinetics`); by
   what share it is right is the same for all rows, too.

@@ -165,7 +165,7 @@ class SecondStage:
 
 
 def _muscle_of(entry: Mapping[str, Any]) -> np.ndarray:
-    """Return what was saved of a muscle, (4,); KeyError or ValueError if that is damaged."""
+    """Return what was saved of a muscle, (5,); KeyError or ValueError if that is damaged."""
     muscle = np.array(entry['formation'], dtype=float)
     if muscle.shape != (formation.SIZE,) or not np.all(np.isfinite(muscle)):
         raise ValueError(f'formation is {entry["formation"]}')
