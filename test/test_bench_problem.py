@@ -10,7 +10,7 @@ import pytest
 from hysteresis_ros.diagnosis import bench_problem
 from hysteresis_ros.diagnosis.bench_design import operator_with
 from hysteresis_ros.diagnosis.bench_effects import add_effects
-from hysteresis_ros.diagnosis.bench_fit import BenchFitter, Response
+from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.kind import problem_for
@@ -166,14 +166,12 @@ def test_effects_are_fitted_to_what_counts(model, tables, monkeypatch):
         return np.mean((balanced.emphasis * (balanced.measured - balanced.simulate(found))) ** 2)
     assert cost(BenchFitter(balanced).fit(effects).effects) < 0.99 * cost(effects)
 
-    # With next to no weight on it they are those of the others.
+    # With next to no weight on it they follow the others.
     balanced = balanced.with_emphasis(np.where(balanced.trial == 2, 1e-4, 1.0))
-    rows = balanced.trial != 2
-    alone = BenchFitter(balanced).fit(effects)
-    without = Response(balanced, [], effects, rows)
-    expected = without.fit(without.minimise(without.parameters.vector(), 8, 1e-3))
-    assert alone.effects[0].C == pytest.approx(expected.effects[0].C, rel=3e-3)
-    assert abs(effects[0].C / expected.effects[0].C - 1.0) > 0.01
+
+    def off_on_others(found):
+        return np.std((balanced.measured - balanced.simulate(found))[balanced.trial != 2])
+    assert off_on_others(BenchFitter(balanced).fit(effects).effects) < 0.5 * off_on_others(effects)
 
     def off_elsewhere():
         found = extended_model(bare, USUAL, [table])[0]
