@@ -71,10 +71,12 @@ hypothesis.settings.load_profile('suite')
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what `-m "not slow"`, `-m "not nodes"` and `-m "not long"` leave out."""
+    """Mark what `-m "not slow"`, "not nodes" and "not long" leave out; all that is long is slow."""
     for item in items:
         if not {item.name, getattr(item, 'originalname', None)}.isdisjoint(LONG):
             item.add_marker('long')
+        if item.get_closest_marker('long'):
+            item.add_marker('slow')
         for marker, stems in (('slow', SLOW), ('nodes', NODES)):
             if item.path.stem in stems:
                 item.add_marker(marker)

@@ -117,7 +117,7 @@ def test_rows_left_out_tell_the_share(usual, share):
 @pytest.mark.parametrize('rho', [0.0, pytest.param(0.9, marks=pytest.mark.long)])
 def test_no_bench_whose_loops_close_shows_them(usual, rho):
     """Whatever its noise, which may last for ten rows."""
-    for seed in range(4):
+    for seed in range(2):
         length = made(usual, 0.0, rho, seed, 2e-4)
         assert shown_kinetics(fitter_of(usual, length), usual.effects) is None
 

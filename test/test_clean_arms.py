@@ -15,11 +15,9 @@ from hysteresis_ros.measurements import Measurement
 TRIALS = {'length_trials': range(4), 'force_trials': [0]}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize('muscle, seed', [
-    ('lagoudas', 6301), pytest.param('lagoudas', 6302, marks=pytest.mark.long),
-    pytest.param('tanaka', 6301, marks=pytest.mark.long),
-    pytest.param('tanaka', 6302, marks=pytest.mark.long)])
+    ('lagoudas', 6301), ('lagoudas', 6302), ('tanaka', 6301), ('tanaka', 6302)])
 def test_a_clean_arm_is_adequate_whatever_its_wires_are(muscle, seed):
     """
     With what its bench proves; on a whole recording of four settled trials.

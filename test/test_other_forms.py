@@ -76,7 +76,8 @@ CREEP = {
 }
 
 
-@pytest.mark.parametrize('form', ['kelvin_voigt', pytest.param('power', marks=LONG)])
+@LONG
+@pytest.mark.parametrize('form', ['kelvin_voigt', 'power'])
 def test_creep_by_another_law_is_creep(monkeypatch, form):
     creep_on = ParallelWires._creep_on
 
@@ -154,7 +155,8 @@ def test_creep_that_is_as_large_after_a_small_step_is_creep(monkeypatch, protoco
     assert found.rmse_after < 0.7 * found.rmse_before
 
 
-@pytest.mark.parametrize('radiated', [0.0, pytest.param(1.0, marks=LONG)])
+@LONG
+@pytest.mark.parametrize('radiated', [0.0, 1.0])
 def test_heat_lost_by_convection_or_radiation_alone_is_heat_loss(monkeypatch, radiated):
     monkeypatch.setattr(still_air, 'RADIATED', radiated)
     found = found_in({'heat_loss': 1.0}, 5, trials=(0, 1))

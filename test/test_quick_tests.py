@@ -30,6 +30,6 @@ def test_it_fails_when_either_part_does(run, failing, status):
 def test_every_test_that_is_not_slow_is_in_one_part(run):
     """What nodes print comes after the rest, and is told last."""
     core, nodes, left_out = run('').stdout.splitlines()
-    assert core == 'core: not (nodes or linter) and not slow and not long'
-    assert nodes == 'nodes: (nodes or linter) and not slow and not long'
+    assert core == 'core: not (nodes or linter) and not slow'
+    assert nodes == 'nodes: (nodes or linter) and not slow'
     assert 'make test-all' in left_out
