@@ -8,7 +8,7 @@ from model_support import arm_run, bicep_model, effect_of, GEOMETRY, runs
 import numpy as np
 import pytest
 
-from hysteresis_ros.diagnosis import discrepancy
+from hysteresis_ros.diagnosis import bench_error, discrepancy
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.diagnosis.settings import Settings
@@ -175,7 +175,7 @@ def test_the_sensitivity_is_the_slope_of_the_arm(problem):
 def test_the_largest_error_that_the_bench_has_shown_counts():
     """Of trials and of loads that were left out; else that of the fitted trials, else none."""
     def error(**length):
-        return discrepancy.length_error(bicep_model(metrics={
+        return bench_error.length_error(bicep_model(metrics={
             'length': {part: {'rmse': value} for part, value in length.items()}}))
     assert error(verification=0.0004) == 0.0004
     assert error(verification=0.0004, left_out=0.0015) == 0.0015
@@ -183,7 +183,7 @@ def test_the_largest_error_that_the_bench_has_shown_counts():
     assert error(identification=0.001) == 0.001
     assert error(identification=0.001, verification=0.0004) == 0.0004
     assert error(left_out=None, verification=float('nan')) == 0.0
-    assert discrepancy.length_error(bicep_model(metrics={})) == 0.0
+    assert bench_error.length_error(bicep_model(metrics={})) == 0.0
 
 
 def test_rows_that_were_fitted_are_off_by_less_than_those_that_are_left_out():
@@ -192,7 +192,7 @@ def test_rows_that_were_fitted_are_off_by_less_than_those_that_are_left_out():
     parts = {'left_out': left_out, 'identification': [1e-5, 2e-5, 1e-5]}
 
     def error(**further):
-        return discrepancy.length_errors(
+        return bench_error.length_errors(
             bicep_model(metrics=by_load(loads, **parts, **further)), np.array(loads))
     fitted, rows = error(), error(rows_left_out=[1e-4, 1e-4, 1e-4])
     assert np.all(fitted < 2.1e-5) and rows == pytest.approx(np.full(3, 1e-4))
@@ -212,7 +212,7 @@ def test_the_error_of_the_length_is_that_under_the_load_of_the_arm():
     loads, asked = (1.0, 3.0, 5.0, 9.0), np.array([-1.0, 1.0, 2.5, 5.0, 7.0, 11.0, 13.0])
 
     def error(**parts):
-        return discrepancy.length_errors(bicep_model(metrics=by_load(loads, **parts)), asked)
+        return bench_error.length_errors(bicep_model(metrics=by_load(loads, **parts)), asked)
     found = error(left_out=[8e-4, 2e-4, 1e-4, 6e-4], identification=[4e-4, 1e-5, 2e-4, 3e-4])
     at_loads = 1e-8 * np.array([4.0, 0.1, 2.0, 3.0]) ** 2
     further = 1e-8 * np.array([48.0, 3.99, 0.0, 27.0])
@@ -228,7 +228,7 @@ def test_the_error_of_the_length_is_that_under_the_load_of_the_arm():
 def test_a_load_that_was_left_out_says_twice_what_one_that_lacks_in_between_does():
     """Without it the next one is as far away as they are apart; from their middle it is half."""
     metrics = by_load((1.0, 3.0, 5.0), left_out=3 * [3e-4], identification=3 * [0.0])
-    found = discrepancy.length_errors(bicep_model(metrics=metrics), np.array([1.0, 2.0, 4.5, 7.0]))
+    found = bench_error.length_errors(bicep_model(metrics=metrics), np.array([1.0, 2.0, 4.5, 7.0]))
     assert found == pytest.approx([0.0, 1.5e-4, 0.75e-4, 3e-4])
 
 
@@ -236,7 +236,7 @@ def test_a_load_that_was_left_out_says_twice_what_one_that_lacks_in_between_does
     by_load((1.0, 7.0), left_out=[8e-4, 2e-4], identification=[1e-5, 1e-5]),
     {'length': {'left_out': {'rmse': 8e-4}}}])
 def test_two_loads_have_none_between_them_that_could_tell(metrics):
-    found = discrepancy.length_errors(bicep_model(metrics=metrics), np.array([1.0, 4.0, 7.0]))
+    found = bench_error.length_errors(bicep_model(metrics=metrics), np.array([1.0, 4.0, 7.0]))
     assert found == pytest.approx(3 * [8e-4])
 
 
@@ -251,7 +251,7 @@ def test_the_discrepancy_follows_the_load(problem):
     gain, path = discrepancy.sensitivity(problem, []), load_history(problem, []).path
     found = np.diag(discrepancy.discrepancy_along(
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
-    error = discrepancy.length_errors(model, load)
+    error = bench_error.length_errors(model, load)
     assert np.ptp(error) > 1e-5
     assert found == pytest.approx((error * gain) ** 2 + path ** 2 / 12.0)
 
@@ -267,7 +267,7 @@ def test_the_error_halfway_is_as_much_larger_as_the_bench_says():
     share = np.array([-0.1, 0.0, 0.25, 0.5, 1.0, 1.2])
 
     def found(**parts):
-        return discrepancy.relative_errors(bicep_model(metrics=with_relative(**parts)), share)
+        return bench_error.relative_errors(bicep_model(metrics=with_relative(**parts)), share)
     between = np.sqrt(0.25 * 0.4 ** 2 + 0.75 * 2.0 ** 2)
     assert found(verification=(0.4, 2.0)) == pytest.approx([0.4, 0.4, between, 2.0, 0.4, 0.4])
     # Trials that verify and loads left out count alike.
@@ -284,7 +284,7 @@ def test_the_discrepancy_is_larger_where_the_muscle_transforms(problem):
     gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
     found = np.diag(discrepancy.discrepancy_along(
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
-    relative = discrepancy.relative_errors(model, history.martensite)
+    relative = bench_error.relative_errors(model, history.martensite)
     assert relative.max() - relative.min() > 0.5
     assert found == pytest.approx((4e-4 * gain * relative) ** 2 + history.path ** 2 / 12.0)
 
@@ -296,11 +296,11 @@ def test_an_error_of_the_thresholds_shows_where_the_response_follows_the_drive()
     metrics['length']['verification']['relative_rmse']['drive'] = 0.8
     metrics['length']['verification']['drive_slope'] = 5e-4
     model = bicep_model(metrics=metrics)
-    assert discrepancy.drive_error(model) == pytest.approx(0.8 / 5e-4)
+    assert bench_error.drive_error(model) == pytest.approx(0.8 / 5e-4)
     metrics['length']['left_out']['relative_rmse']['drive'] = 0.0
     metrics['length']['left_out']['drive_slope'] = 2e-3
-    assert discrepancy.drive_error(model) == pytest.approx(0.8 / 5e-4 / np.sqrt(2.0))
-    assert discrepancy.drive_error(bicep_model()) == 0.0
+    assert bench_error.drive_error(model) == pytest.approx(0.8 / 5e-4 / np.sqrt(2.0))
+    assert bench_error.drive_error(bicep_model()) == 0.0
     problem = problem_for(model, [runs(model)])
     along = discrepancy.drive_sensitivity(problem, [])
     squared = problem.signals['drive'] ** 2
@@ -314,8 +314,8 @@ def test_an_error_of_the_thresholds_shows_where_the_response_follows_the_drive()
     gain, history = discrepancy.sensitivity(problem, []), load_history(problem, [])
     found = np.diag(discrepancy.discrepancy_along(
         problem, [], problem.simulate([]), Settings()).matrix(courses=False))
-    own = gain * discrepancy.relative_errors(model, history.martensite)
-    thresholds = along * discrepancy.drive_error(model)
+    own = gain * bench_error.relative_errors(model, history.martensite)
+    thresholds = along * bench_error.drive_error(model)
     assert found == pytest.approx(
         4e-4 ** 2 * (own ** 2 + thresholds ** 2) + history.path ** 2 / 12.0)
 

@@ -8,7 +8,10 @@ from model_support import bicep_model, effect_of, runs, with_noise
 import numpy as np
 import pytest
 
+from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.report.words import verdict_in_words
 
 TRIED = ['payload_error', 'encoder_offset', 'end_stop']
@@ -80,3 +83,17 @@ def test_where_it_is_tried_by_name_the_sets_say_it(model):
                          tried=[*TRIED, 'formation_memory'])
     assert found.kept_strain is None
     assert found.ranking[0]['effect'] == 'formation_memory'
+
+
+def test_what_a_play_makes_of_a_share_is_not_that_share_of_what_it_makes_of_all(model):
+    """So that each course is that of the share which explains most of the residual."""
+    play = effect_of(model, 'backlash', B=6.0)
+    whole = [*model.effects, play]
+    problem = problem_for(model, [runs(model, rows=30)])
+    own, kept_strain = problem.simulate_many(
+        [whole, [*whole, effect_of(model, 'formation_memory', kept=0.35)]])
+    residual = kept_strain - own
+    left = [np.std(discrepancy.discrepancy_along(
+        problem, whole, own, Settings(), residual=known).besides_courses(residual))
+        for known in (None, residual)]
+    assert left[0] > 0.05 * np.std(residual) and left[1] < 0.4 * left[0]

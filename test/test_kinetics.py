@@ -12,6 +12,7 @@ import pytest
 
 from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.diagnose import diagnose
+from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.operators import (
@@ -275,3 +276,29 @@ def test_who_names_it_is_told_by_the_sets(model):
     found = diagnose(model, [recorded(model, 0.8)], [*TRIED, 'kinetics'])
     assert found.missing == ['kinetics'] and found.kinetics is None
     assert found.effects[0].values['share'] == pytest.approx(0.8, abs=0.05)
+
+
+@pytest.mark.parametrize('factor', [0.5, 2.0, 20.0])
+def test_a_place_is_no_more_uncertain_than_the_bench_has_shown(model, factor):
+    """Of a part that follows its kinetics; weights of the others may have changed a lot with it."""
+    own = effect_of(model, 'kinetics', share=0.5)
+    on_bench = 0.5 * discrepancy._kinetics_on_bench(model, own)
+    assert 1e-4 < on_bench < 2e-3
+    made = dataclasses.replace(
+        model, effects=[own], metrics={'length': {'verification': {'rmse': factor * on_bench}}})
+    problem = problem_for(made, [to_and_fro()])
+    plain, whole = problem.simulate_many([[], [own.with_values(share=1.0)]])
+    assert discrepancy.kinetics_spread(problem, [own]) == pytest.approx(
+        min(factor, 1.0) * 0.5 * (whole - plain))
+
+
+def test_a_bench_has_the_loads_of_its_tables(model):
+    """Under each it goes through loops that become smaller."""
+    own = effect_of(model, 'kinetics', share=0.5)
+    growing = model.with_effects([effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)])
+    light, heavy = (discrepancy._kinetics_on_bench(dataclasses.replace(growing, metrics={
+        'length': {'identification': {'loads': [load]}}}), own) for load in (0.3, 6.0))
+    assert 0.0 < light < 0.8 * heavy
+    both = discrepancy._kinetics_on_bench(dataclasses.replace(growing, metrics={
+        'length': {'identification': {'loads': [0.3, 6.0]}}}), own)
+    assert both ** 2 == pytest.approx(0.5 * (light ** 2 + heavy ** 2))

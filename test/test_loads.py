@@ -10,7 +10,7 @@ from hysteresis_ros.bicep import BicepGeometry
 from hysteresis_ros.cli.main import main
 from hysteresis_ros.diagnosis.bench_effects import add_effects
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.diagnosis.discrepancy import length_error
+from hysteresis_ros.diagnosis.bench_error import length_error
 from hysteresis_ros.errors import ParameterError
 from hysteresis_ros.identification.bench import identify
 from hysteresis_ros.identification.bench_metrics import drive_slope

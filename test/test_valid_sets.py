@@ -86,6 +86,20 @@ def test_equations_may_be_off_by_their_share_of_what_they_explain_together(
         assert bool(sets.sufficient(names)) is enough
 
 
+@pytest.mark.parametrize('own, surpassed', [(0.3, False), (0.45, True)])
+def test_the_equation_of_an_effect_may_be_off_by_a_share_of_all_that_there_was(
+        payload, monkeypatch, own, surpassed):
+    """Also of what the shares of courses would have explained without it."""
+    sets, size = payload.sets, payload.sets.covariance.size
+    names, other = frozenset(['payload_error']), frozenset(['encoder_offset'])
+    whole = 100.0 * size
+    errors = {frozenset(): 0.1 * whole, names: own * 0.25 * whole, other: 0.5 * size}
+    monkeypatch.setattr(sets, 'own_error', lambda one: errors[one])
+    monkeypatch.setattr(sets, 'error', lambda one: whole)
+    monkeypatch.setattr(sets, 'settings', dataclasses.replace(sets.settings, form=0.1))
+    assert sets._surpassed(names, [other, names]) is surpassed
+
+
 @pytest.mark.parametrize('share, enough', [(0.45, False), (0.55, True)])
 def test_a_set_that_fails_in_rows_held_out_does_not_suffice(payload, monkeypatch, share, enough):
     """However little it leaves in those fitted: half of what it explains there is asked for."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.arm_fit import Fit
+from hysteresis_ros.diagnosis.bench_error import FEWEST_LOADS
 from hysteresis_ros.diagnosis.bench_expansion import with_expansion
 from hysteresis_ros.diagnosis.bench_fit import BenchFitter
 from hysteresis_ros.diagnosis.bench_kinetics import shown_kinetics
@@ -19,7 +20,6 @@ from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.between_loads import best_between_loads
 from hysteresis_ros.diagnosis.determined import not_determined
 from hysteresis_ros.diagnosis.diagnose import diagnose
-from hysteresis_ros.diagnosis.discrepancy import FEWEST_LOADS
 from hysteresis_ros.diagnosis.extend import extended_model
 from hysteresis_ros.diagnosis.forms import with_best_forms
 from hysteresis_ros.diagnosis.kind import problem_for

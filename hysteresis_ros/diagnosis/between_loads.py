@@ -6,7 +6,7 @@ What every loaded muscle has, judged under the loads of a bench that lie between
 A load that is left out is predicted from the others. The lightest and the heaviest one are
 extrapolated to, which says nothing where the stroke soon stops growing with the load, and which no
 arm asks for whose loads the bench encloses; of those two the rows fitted count instead, as they do
-for the discrepancy of an arm (`discrepancy.length_errors`).
+for the discrepancy of an arm (`bench_error.length_errors`).
 """
 
 from __future__ import annotations

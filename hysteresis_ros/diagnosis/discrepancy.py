@@ -38,6 +38,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hysteresis_ros.diagnosis.bench_error import (
+    drive_error, length_error, length_errors, relative_errors)
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.effects import (
     DriveEffect, Effect, Inputs, MaterialEffect, Parameter, Surroundings)
@@ -46,7 +48,7 @@ from hysteresis_ros.effects.base import Values
 from hysteresis_ros.effects.formation_memory import FormationMemory
 from hysteresis_ros.effects.kinetics import Kinetics
 from hysteresis_ros.identification.bench_metrics import SHIFT
-from hysteresis_ros.measurements.metrics import halfway
+from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.measurements.way import unit, way_done
 
 if TYPE_CHECKING:
@@ -63,8 +65,8 @@ SHARE, SHARE_SPREAD = 1.0 / math.sqrt(3.0), 1.0 / math.sqrt(12.0)
 COURSES: tuple[type[Effect], ...] = (FormationMemory, Kinetics)
 # Of the courses those of a changing load, of which the share may differ from place to place.
 FROM_LOADS = [3, 4]
-# Of as many loads one lies between others, and tells what the model does between them.
-FEWEST_LOADS = 3
+# Turns of the oscillation that stands for a bench, and rows from one to the next.
+SWINGS, SWING_ROWS = 12, 5
 
 
 @dataclasses.dataclass
@@ -117,18 +119,8 @@ class Discrepancy:
                                      + np.sum(self.common ** 2, axis=1))))
 
     def shares(self, residual: np.ndarray, deviation: np.ndarray | float = 1.0) -> np.ndarray:
-        """
-        Return the shares (c,) of the `courses`, 0 to 1, that explain most of a residual (n,).
-
-        In units of a standard deviation (n,) of each row, where it is given.
-        """
-        from scipy.optimize import lsq_linear       # a third of a second that a bench does not need
-        found, acting = np.zeros(self.courses.shape[1]), np.any(self.courses, axis=0)
-        if np.any(acting):
-            found[acting] = lsq_linear(
-                self.courses[:, acting] / np.reshape(deviation, (-1, 1)), residual / deviation,
-                (0.0, 1.0), method='bvls').x
-        return found
+        """Return the `course_shares` that explain most of a residual (n,)."""
+        return course_shares(self.courses, residual, deviation)
 
     def besides_courses(self, residual: np.ndarray, deviation: np.ndarray | float = 1.0
                         ) -> np.ndarray:
@@ -147,6 +139,22 @@ class Discrepancy:
         known = (self.common @ self.common.T
                  + (parts @ parts.T) / np.sqrt(1.0 + np.maximum(gaps, 0.0)))
         return known + SHARE ** 2 * self.courses @ self.courses.T if courses else known
+
+
+def course_shares(courses: np.ndarray, residual: np.ndarray, deviation: np.ndarray | float = 1.0
+                  ) -> np.ndarray:
+    """
+    Return the shares (c,) of courses (n, c), 0 to 1, that explain most of a residual (n,).
+
+    In units of a standard deviation (n,) of each row, where it is given.
+    """
+    from scipy.optimize import lsq_linear       # a third of a second that a bench does not need
+    found, acting = np.zeros(courses.shape[1]), np.any(courses, axis=0)
+    if np.any(acting):
+        found[acting] = lsq_linear(
+            courses[:, acting] / np.reshape(deviation, (-1, 1)), residual / deviation,
+            (0.0, 1.0), method='bvls').x
+    return found
 
 
 class Offset(MaterialEffect):
@@ -175,115 +183,6 @@ class Shift(DriveEffect):
         return signal + self.size
 
 
-def length_error(model: MuscleModel) -> float:
-    """
-    Return the root mean square error of the length [m] that the bench has shown.
-
-    The largest of that on trials that were not fitted, that on loads left out of the fit, and,
-    where neither is known, that on the trials fitted.
-    """
-    metrics = model.metrics.get('length', {})
-    errors = [metrics.get(part, {}).get('rmse') for part in ('verification', 'left_out')]
-    known = [float(error) for error in errors if error is not None and np.isfinite(error)]
-    if known:
-        return max(known)
-    error = metrics.get('identification', {}).get('rmse')
-    return float(error) if error is not None and np.isfinite(error) else 0.0
-
-
-def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
-    """
-    Return the root mean square error of the length [m] that the bench has shown under a load.
-
-    Under the bench's own loads it is the larger one of that on rows left out one at a time and on
-    trials that were not fitted. What a load shows beyond that when it is left out, it shows at its
-    distance from the nearest one that stays; between and beyond the loads it counts in proportion
-    to theirs, which are half as large in the middle between two. Errors of few rows are uncertain,
-    so that those of near loads are averaged, with Gaussian weights as wide as loads are apart. With
-    fewer than three loads it is one number for all.
-
-    Parameters
-    ----------
-    model : MuscleModel
-    load : ndarray, shape (n,)
-        Tension of a muscle [N].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-    """
-    metrics = model.metrics.get('length', {})
-    left_out, fitted, rows, verified = (
-        [np.array(metrics.get(part, {}).get(key, ()), dtype=float)
-         for key in ('loads', 'rmse_by_load')]
-        for part in ('left_out', 'identification', 'rows_left_out', 'verification'))
-    loads, errors = left_out
-    if len(loads) < FEWEST_LOADS or len(fitted[0]) != len(loads):
-        return np.full(len(load), length_error(model))
-    at_loads = np.maximum(fitted[1], rows[1]) if len(rows[1]) == len(loads) else fitted[1]
-    if len(verified[0]):
-        at_loads = np.maximum(at_loads, np.interp(loads, verified[0], verified[1]))
-    gaps = np.diff(loads)
-    to_next = np.minimum(np.append(np.inf, gaps), np.append(gaps, np.inf))
-    within = np.clip(load, loads[0], loads[-1])[:, None] - loads
-    near = np.exp(-0.5 * (within / np.median(gaps)) ** 2)
-    near /= np.sum(near, axis=1, keepdims=True)
-    growth = near @ np.maximum(errors ** 2 - at_loads ** 2, 0.0) / (near @ to_next ** 2)
-    away = np.min(np.abs(load[:, None] - loads), axis=1)
-    return np.sqrt(near @ at_loads ** 2 + growth * away ** 2)
-
-
-def relative_errors(model: MuscleModel, martensite: np.ndarray) -> np.ndarray:
-    """
-    Return the error of the length at a share of martensite over that of all, as the bench says.
-
-    The mean square is laid out between the ends and halfway by 4 xi (1 - xi).
-
-    Parameters
-    ----------
-    model : MuscleModel
-    martensite : ndarray, shape (n,)
-        Share xi of martensite, 0 to 1.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        All 1 where the model's metrics say nothing of it.
-    """
-    known = _relative(model)
-    if not known:
-        return np.ones(len(martensite))
-    ends, between = (np.mean([one[name] ** 2 for one in known]) for name in ('ends', 'halfway'))
-    share = halfway(np.clip(martensite, 0.0, 1.0))
-    return np.sqrt((1.0 - share) * ends + share * between)
-
-
-def drive_error(model: MuscleModel) -> float:
-    """
-    Return the error of the thresholds for an error of the length, as the bench says.
-
-    A wire that transforms within a few volts misses a threshold where it is steep, and nothing
-    where it is cold or hot; and most rows of a bench are.
-
-    Returns
-    -------
-    float
-        Root mean square, drive squared per unit of the length; 0 where the model's metrics say
-        nothing of it.
-    """
-    known = [(one['drive'] / one['drive_slope']) ** 2 for one in _relative(model)
-             if 'drive' in one]
-    return math.sqrt(np.mean(known)) if known else 0.0
-
-
-def _relative(model: MuscleModel) -> list[dict[str, float]]:
-    """Return of what the errors of trials and loads that were held out consist."""
-    metrics = model.metrics.get('length', {})
-    return [{**metrics[part]['relative_rmse'],
-             **{name: metrics[part][name] for name in ('drive_slope',) if name in metrics[part]}}
-            for part in ('verification', 'left_out') if 'relative_rmse' in metrics.get(part, {})]
-
-
 def sensitivity(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
     """Return how the angle follows an error of the length [rad/m], shape (n,)."""
     return _slope(Offset(size=0.01 * problem.model.surroundings.span), problem, effects)
@@ -305,8 +204,8 @@ def _slope(effect: Effect, problem: ArmProblem, effects: Sequence[Effect]) -> np
 
 
 def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted: np.ndarray,
-                      settings: Settings, tried: Collection[str] = (), room: bool = False
-                      ) -> Discrepancy:
+                      settings: Settings, tried: Collection[str] = (), room: bool = False,
+                      residual: np.ndarray | None = None) -> Discrepancy:
     """
     Return the base model's own error of the angle, along the way that the arm takes.
 
@@ -327,6 +226,10 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
         Identifiers of all effects that may explain the recording.
     room : bool
         Whether what the recorded room does is one of the errors; see `room_is_calm`.
+    residual : ndarray, shape (n,), optional
+        Of the fit whose way it is: the `courses` are those at the shares that explain most of it,
+        over these shares. What a play or a stop makes of a half is not half of what it makes of
+        all.
 
     Returns
     -------
@@ -344,6 +247,9 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     drive = problem.signals.get('drive', np.zeros(len(predicted)))
     known = {*tried, *(effect.id for effect in effects)}
     courses = np.column_stack([_courses_along(problem, effects, known), history.path])
+    if residual is not None:
+        courses[:, :-1] = _courses_along(
+            problem, effects, known, course_shares(courses, residual).tolist())
     parts = np.column_stack([bench, DIRECTIONAL * direction * bench,
                              SHARE_SPREAD * courses[:, FROM_LOADS],
                              kinetics_spread(problem, effects)])
@@ -355,22 +261,30 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
         / settings.correlation, common, courses, np.zeros((len(predicted), 0)))
 
 
-def _courses_along(problem: ArmProblem, effects: Sequence[Effect], known: Collection[str]
-                   ) -> np.ndarray:
-    """Return the `courses` but for the last one, shape (n, 4); 0 for effects that are `known`."""
+def _courses_along(problem: ArmProblem, effects: Sequence[Effect], known: Collection[str],
+                   shares: Sequence[float] = (1.0,) * 5) -> np.ndarray:
+    """
+    Return the `courses` but for the last one, shape (n, 4); 0 for effects that are `known`.
+
+    Each is that of its own share, over the share; what a heavier load orients is that of what is
+    kept.
+    """
     kept, kinetics = (
         np.zeros(len(problem.measured)) if kind.id in known or not kind.available(
-            problem.model.surroundings) else course_of(kind, problem, effects)
-        for kind in COURSES)
+            problem.model.surroundings) else course_of(kind, problem, effects, share)
+        for kind, share in zip(COURSES, shares))
     hung_cold = anew = kept
     if np.any(kept):
-        hung_cold, anew = (course_of(FormationMemory, problem, effects, **form)
-                           for form in ({'cooled': 0.0}, {'anew': 1.0}))
-    return np.column_stack([kept, kinetics, hung_cold, anew - kept])
+        whole = min(shares[0] + shares[2], 1.0)
+        hung_cold, anew, likewise = (
+            course_of(FormationMemory, problem, effects, share, **form) for share, form in (
+                (shares[2], {'cooled': 0.0}), (whole, {'anew': 1.0}), (whole, {})))
+        anew = anew - likewise
+    return np.column_stack([kept, kinetics, hung_cold, anew])
 
 
 def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect],
-              **others: float) -> np.ndarray:
+              share: float = 1.0, **others: float) -> np.ndarray:
     """
     Return what the response would change by if all of the wire did what one of `COURSES` says.
 
@@ -381,6 +295,9 @@ def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect]
         Rows and model.
     effects : sequence of Effect
         All effects of the model, none of this kind among them.
+    share : float
+        How much of the wire does it: what that changes is divided by it. Of a share that is too
+        small to count it is that of all.
     **others : float
         Values of other parameters than the share.
 
@@ -389,8 +306,9 @@ def course_of(kind: type[Effect], problem: ArmProblem, effects: Sequence[Effect]
     ndarray, shape (n,)
     """
     size = kind.parameters[0]
-    return _change_by(
-        kind(problem.model.surroundings, **{size.name: 1.0}, **others), problem, effects)
+    share = share if share >= size.low else 1.0
+    return _change_by(kind(problem.model.surroundings, **{size.name: share}, **others), problem,
+                      effects) / share
 
 
 def kinetics_spread(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
@@ -398,7 +316,8 @@ def kinetics_spread(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarra
     Return how much the response may be off where part of the wire follows its kinetics.
 
     Of a share s that does, each place may be one that does or one that does not, with a variance of
-    s (1 - s) about their mean. A wire all of which does has no such places.
+    s (1 - s) about their mean. A wire all of which does has no such places. On a bench the same
+    would show as an error of the length: what is more than that has shown is not there.
 
     Parameters
     ----------
@@ -416,8 +335,30 @@ def kinetics_spread(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarra
     if own is None or not 0.0 < own.share < 1.0:
         return np.zeros(len(problem.measured))
     others = [effect for effect in effects if effect is not own]
-    return math.sqrt(own.share * (1.0 - own.share)) * _change_by(
-        own.with_values(share=1.0), problem, others)
+    change = _change_by(own.with_values(share=1.0), problem, others)
+    spread = math.sqrt(own.share * (1.0 - own.share))
+    on_bench, shown = spread * _kinetics_on_bench(problem.model, own), length_error(problem.model)
+    return (shown / on_bench if 0.0 < shown < on_bench else 1.0) * spread * change
+
+
+def _kinetics_on_bench(model: MuscleModel, own: Kinetics) -> float:
+    """Return what all of the kinetics change on a bench, root mean square of the length [m]."""
+    surroundings = model.surroundings
+    loads = model.metrics.get('length', {}).get('identification', {}).get(
+        'loads') or [surroundings.load]
+    ends = 0.5 + 0.5 * np.linspace(1.0, 0.0, SWINGS) * (-1.0) ** np.arange(1, SWINGS + 1)
+    course = np.interp(np.arange(SWINGS * SWING_ROWS) / SWING_ROWS, np.arange(SWINGS), ends)
+    rows = len(course)
+    bench = Measurement.from_columns({
+        'trial': np.repeat(np.arange(len(loads)), rows),
+        'step': np.tile(np.arange(rows), len(loads)),
+        surroundings.drive: model.cold_drive + model.drive_range * np.tile(course, len(loads)),
+        'force': np.repeat(loads, rows), 'length': np.zeros(rows * len(loads))})
+    others = [effect for effect in model.effects
+              if effect.id != own.id and 'bench' in effect.kinds]
+    without, whole = (model.with_effects(effects).predict(bench) for effects in (
+        others, [*others, own.with_values(share=1.0)]))
+    return float(np.sqrt(np.mean((whole - without) ** 2)))
 
 
 def _change_by(effect: Effect, problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:

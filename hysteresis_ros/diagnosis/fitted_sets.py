@@ -363,7 +363,7 @@ class FittedSets:
 
     def _surpassed(self, names: frozenset[str], others: Iterable[frozenset[str]]) -> bool:
         """Whether another set of as few effects predicts far better."""
-        form = self.settings.form * self.own_error(frozenset())
+        form = self.settings.form * self.error(frozenset())
         least = self.own_error(names) ** 2 - self.covariance.size ** 2 - form ** 2
         return least > 0.0 and any(self.own_error(other) ** 2 < least for other in others
                                    if 0 < len(other) <= len(names))

@@ -100,16 +100,18 @@ class Selection:
         share is two standard deviations.
         """
         effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
-        found = self._along(effects, fit.predicted)
+        found = self._along(
+            effects, fit.predicted, self.problem.measured - fit.predicted if fit.effects else None)
         without = self.fitter.simulate([
             [one for one in fit.effects if one is not effect] for effect in fit.effects])
         return dataclasses.replace(
             found, equations=0.5 * self.settings.form * (fit.predicted - without).T)
 
-    def _along(self, effects: Sequence[Effect], predicted: np.ndarray) -> Discrepancy:
+    def _along(self, effects: Sequence[Effect], predicted: np.ndarray,
+               residual: np.ndarray | None = None) -> Discrepancy:
         """Return the base model's own error where the arm goes with all effects of a model."""
-        return discrepancy_along(
-            self.problem, effects, predicted, self.settings, self.names, self._calm)
+        return discrepancy_along(self.problem, effects, predicted, self.settings, self.names,
+                                 self._calm, residual)
 
     def run(self) -> None:
         """Score all single effects and pairs, fit the best, and grow sets from them."""
