@@ -73,6 +73,23 @@ def test_solver_meets_the_optimality_conditions_of_scipys(seed, size, ridge):
     assert again == pytest.approx(x, abs=1e-8)
 
 
+@pytest.mark.parametrize('size, seed', [(80, 0), (120, 19)])
+def test_a_start_from_which_no_solution_is_found_is_given_up(size, seed):
+    """Unknowns changed sides one at a time, for a minute where there are a thousand."""
+    rng, bound = np.random.default_rng(seed), np.zeros(size, dtype=bool)
+    rows = size // 2
+    there = np.linspace(0.0, 1.0, rows)[:, None] - np.sort(rng.uniform(0.0, 1.0, size))
+    design = np.exp(-0.5 * (there / 0.1) ** 2)
+    gram = design.T @ design / rows + 5e-7 * np.eye(size)
+    target = np.arange(1, rows + 1) / rows + 1e-3 * rng.standard_normal(rows)
+    moment = design.T @ target / rows
+    expected, inside = solve_nonnegative(gram, moment, bound)
+    found, passive = solve_nonnegative(gram, moment, bound, rng.random(size) < 0.6)
+    assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    assert np.array_equal(passive, inside)
+
+
+
 def test_solver_leaves_free_unknowns_without_a_bound():
     x, _ = solve_nonnegative(np.eye(2), np.array([-1.0, -2.0]), np.array([False, True]))
     assert x == pytest.approx([0.0, -2.0])

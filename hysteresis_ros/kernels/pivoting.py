@@ -16,7 +16,8 @@ def pivot(gram: np.ndarray, moment: np.ndarray, free: np.ndarray, passive: np.nd
     """
     Minimise x @ gram @ x / 2 - moment @ x with x >= 0 except where `free`.
 
-    Unknowns of the wrong sign change sides together, one at a time when that stops helping.
+    Unknowns of the wrong sign change sides together, one at a time when that stops helping. From a
+    start for which it does, the search begins once more at the bound.
 
     Parameters
     ----------
@@ -42,6 +43,7 @@ def pivot(gram: np.ndarray, moment: np.ndarray, free: np.ndarray, passive: np.nd
     """
     size = len(moment)
     fewest, tries = size + 1, 3
+    begun = not np.any(passive & ~free)
     x, wrong = np.zeros(size), np.zeros(size, dtype=np.bool_)
     for _ in range(20 * size):
         index = np.flatnonzero(passive)
@@ -72,6 +74,11 @@ def pivot(gram: np.ndarray, moment: np.ndarray, free: np.ndarray, passive: np.nd
             fewest, tries = count, 3
         elif tries > 0:
             tries -= 1
+        elif not begun:
+            # One at a time, a thousand unknowns took a minute, and came to no end.
+            fewest, tries, begun = size + 1, 3, True
+            passive[:] = free
+            continue
         else:
             wrong[:] = False
             wrong[last] = True
