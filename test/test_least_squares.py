@@ -89,7 +89,6 @@ def test_a_start_from_which_no_solution_is_found_is_given_up(size, seed):
     assert np.array_equal(passive, inside)
 
 
-
 def test_solver_leaves_free_unknowns_without_a_bound():
     x, _ = solve_nonnegative(np.eye(2), np.array([-1.0, -2.0]), np.array([False, True]))
     assert x == pytest.approx([0.0, -2.0])
