@@ -17,11 +17,12 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Whole diagnoses, whole sessions and many fits of a bench, by file: marked as slow, as single tests
 # may be, too.
-SLOW = ('test_bench_diagnosis', 'test_bench_kinetics', 'test_bench_overlooked',
-        'test_between_loads', 'test_demo', 'test_diagnose', 'test_faults',
-        'test_firmware_machine_code', 'test_fuzz', 'test_kernel_cache', 'test_link_states',
-        'test_loads', 'test_page_in_browser', 'test_readme', 'test_replicates',
-        'test_studio_in_browser', 'test_table1', 'test_whole_sets')
+SLOW = ('test_bench_diagnosis', 'test_bench_expansion', 'test_bench_kinetics',
+        'test_bench_overlooked', 'test_bench_problem', 'test_between_loads', 'test_demo',
+        'test_diagnose', 'test_faults', 'test_firmware_machine_code', 'test_fuzz',
+        'test_kernel_cache', 'test_link_states', 'test_loads', 'test_page_in_browser',
+        'test_readme', 'test_replicates', 'test_studio_in_browser', 'test_table1',
+        'test_whole_sets')
 
 # Nodes and boards at work, their firmware, processes and files, the arms of the laboratory, and the
 # package as a whole. They depend on ROS and on compilers, which are the same with all versions of

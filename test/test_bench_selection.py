@@ -399,13 +399,10 @@ def test_every_load_counts_alike_whatever_its_error(selection):
         selection.problem.measured)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize('muscle, seed', [
-    pytest.param('lagoudas', 6302, marks=pytest.mark.long),
-    pytest.param('lagoudas', 6311, marks=pytest.mark.long),
-    pytest.param('brinson', 6353, marks=pytest.mark.long),
-    pytest.param('brinson', 6602, marks=pytest.mark.long),
-    pytest.param('brinson', 6601, marks=pytest.mark.long), ('brinson', 6708)])
+    ('lagoudas', 6302), ('lagoudas', 6311), ('brinson', 6353), ('brinson', 6602),
+    ('brinson', 6601), ('brinson', 6708)])
 def test_what_the_load_does_is_named_on_every_specimen_and_no_wear(muscle, seed):
     """
     Wear that is not there takes a twentieth to a half off the error of one of four loads held out.

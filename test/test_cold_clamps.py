@@ -225,7 +225,7 @@ def test_a_strong_one_of_the_laboratory_costs_five_degrees_at_full_heat():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('strength', [1.0, 0.4])
+@pytest.mark.parametrize('strength', [1.0, pytest.param(0.4, marks=pytest.mark.long)])
 def test_it_is_found_on_an_arm_of_the_laboratory(strength):
     tried = ['cold_clamps', 'airflow', 'unequal_muscles', 'fatigue', 'slack', 'stress_dependence']
     found = found_in({'cold_clamps': strength}, 4, tried, 'arm-steps')

@@ -225,7 +225,7 @@ def test_rows_before_the_onset_are_the_first_of_one_trial(marked, trials):
         ArmProblem(MODEL, [run])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_effect_that_begins_with_the_window_is_named():
     """Where it counts as having acted before, the memory is another, and it is not."""
     rng = np.random.default_rng(5)

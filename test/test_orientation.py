@@ -242,7 +242,7 @@ def found_without():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('proven', [True, False])
+@pytest.mark.parametrize('proven', [pytest.param(True, marks=pytest.mark.long), False])
 def test_a_bench_shows_it_and_that_a_growth_was_in_part_a_softer_martensite(
         found_without, proven, monkeypatch):
     model, length = found_without

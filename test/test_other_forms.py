@@ -92,7 +92,7 @@ def test_creep_by_another_law_is_creep(monkeypatch, form):
     assert found.rmse_after < 0.5 * found.rmse_before
 
 
-@pytest.mark.parametrize('rested', [True, False])
+@pytest.mark.parametrize('rested', [pytest.param(True, marks=LONG), False])
 def test_creep_that_outlasts_its_hold_is_creep(monkeypatch, rested):
     """A relaxation of 90 s in holds of 30 s; the cold muscle may creep when a trial begins."""
     begin_trial, crept = ParallelWires._begin, {}

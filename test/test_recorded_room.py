@@ -221,7 +221,7 @@ def test_the_bench_of_the_laboratory_feels_its_room():
     assert np.ptp(change) > 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_bench_says_how_much_its_recorded_room_counts():
     table = bench_in_room(3.0)
     own = ['stress_dependence', 'series_compliance', 'stress_dependent_strain']

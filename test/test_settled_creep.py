@@ -38,8 +38,8 @@ def test_what_has_crept_at_the_ends_of_holds_is_fitted_without_the_time_that_the
     assert {'c', 't0'} <= set(moving.intervals)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('strength', [1.0, pytest.param(0.4, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize('strength', [1.0, 0.4])
 def test_creep_is_named_in_the_settled_rows_of_an_arm(strength):
     found = found_in({'creep': strength}, 5, protocol='arm-steps')
     assert (found.verdict, found.missing) == ('missing', ['creep'])

@@ -10,7 +10,7 @@ from hidden_cases import found_in
 from hysteresis_ros.laboratory.arm import Arm
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_training_is_found_with_its_signs():
     tried = ['fatigue', 'ambient_drift', 'creep', 'payload_error']
     found = found_in({'fatigue': -1.0}, 4, tried)
