@@ -314,6 +314,7 @@ def test_units_become_those_of_files(name, unit, written, value):
 @pytest.mark.parametrize('trial, time, expected', [
     ([0, 0, 1, 1], [30, 60, 90, 120], [30, 60, 30, 60]),
     ([0, 0, 1, 1], [0.0, 0.1, 95.0, 95.1], [0.0, 0.1, 0.1, 0.2]),
+    ([0, 0, 1, 1], [60.1, 60.2, 95.0, 95.1], [0.1, 0.2, 0.1, 0.2]),
     ([0, 0, 1, 1], [1.7e9, 1.7e9 + 2, 1.7e9 + 50, 1.7e9 + 52], [0, 2, 2, 4]),
     ([0, 0, 0, 0], [1.7e9, 1.7e9 + 2, 1.7e9 + 4, 1.7e9 + 6], [0, 2, 4, 6])])
 def test_a_clock_that_runs_on_is_counted_from_the_start_of_each_trial(trial, time, expected):

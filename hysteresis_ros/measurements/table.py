@@ -336,7 +336,8 @@ def time_of_trials(time: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, str
 
     Clocks of instruments run on from one trial to the next, and count from a day of their own. The
     first row of a trial comes after what passed since the row before, but not after more than
-    rows are usually apart: what the muscle did between two trials is not known.
+    rows are usually apart: what the muscle did between two trials is not known. Nor is what it did
+    before the first, where the clock runs on from that to the next.
 
     Parameters
     ----------
@@ -357,8 +358,9 @@ def time_of_trials(time: np.ndarray, trial: np.ndarray) -> tuple[np.ndarray, str
     far = bool(time[0] > CALENDAR)
     if not (runs_on or far and len(begins) == 1):
         return time, ''
-    first = np.append(0.0 if far else time[0], np.minimum(between, np.median(within))
-                      if runs_on else ())
+    first = np.zeros(1)
+    if runs_on:
+        first = np.minimum(np.append(0.0 if far else time[0], between), np.median(within))
     rows = np.diff(np.append(begins, len(time)))
     return time - np.repeat(time[begins] - first, rows), (
         'time runs on from trial to trial; it is counted from the start of each' if runs_on
