@@ -95,7 +95,8 @@ class Discrepancy:
         the kinetics of `Kinetics`; if martensite kept all of its strain, but each trial began with
         what the load at rest orients and not with what forms on the way down to rest; what it would
         change besides if a heavier load oriented martensite anew; and if the present load had acted
-        all along (`LoadHistory.path`).
+        all along (`LoadHistory.path`). Along the way of a fit the first four are those at the
+        shares that explain most of its residual, over these shares.
     equations : ndarray, shape (n, e)
         The same as `parts`, for the equations of effects.
     """

@@ -100,8 +100,7 @@ class Selection:
         share is two standard deviations.
         """
         effects = [*unaffected(self.fixed, fit.effects), *fit.effects]
-        found = self._along(
-            effects, fit.predicted, self.problem.measured - fit.predicted if fit.effects else None)
+        found = self._along(effects, fit.predicted, self.problem.measured - fit.predicted)
         without = self.fitter.simulate([
             [one for one in fit.effects if one is not effect] for effect in fit.effects])
         return dataclasses.replace(
