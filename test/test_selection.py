@@ -65,6 +65,21 @@ def test_what_an_effect_changes_is_as_uncertain_as_its_equation(payload):
     assert np.max(np.abs(change)) > 0.02
 
 
+def test_courses_along_a_fit_are_those_at_the_shares_that_its_residual_shows(model):
+    """Half of the kept strain moves a play by another way than half of what all of it does."""
+    grown = model.with_effects([effect_of(model, 'stress_dependent_strain', r=0.6, F0=1.2)])
+    measured = recording(grown, [*grown.effects, effect_of(model, 'backlash', B=6.0),
+                                 effect_of(model, 'formation_memory', kept=0.35)])
+    found = selection(grown, measured, ('backlash',))
+    fit = found.sets.fits[frozenset(['backlash'])]
+    effects, residual = [*grown.effects, *fit.effects], found.problem.measured - fit.predicted
+    along, whole = (discrepancy_along(found.problem, effects, fit.predicted, found.settings,
+                                      found.names, residual=known).courses
+                    for known in (residual, None))
+    np.testing.assert_array_equal(found.fitter.discrepancy(fit).courses, along)
+    assert np.abs(along - whole).max() > 1e-3
+
+
 def test_with_other_effects_the_best_starts_are_still_the_best(model):
     """Chosen by the derivatives that they had alone, and linearised anew."""
     measured = recording(model, [effect_of(model, 'payload_error', dm=15.0),
