@@ -97,3 +97,15 @@ def test_what_a_play_makes_of_a_share_is_not_that_share_of_what_it_makes_of_all(
         problem, whole, own, Settings(), residual=known).besides_courses(residual))
         for known in (None, residual)]
     assert left[0] > 0.05 * np.std(residual) and left[1] < 0.4 * left[0]
+
+
+def test_what_a_heavier_load_orients_is_that_of_what_is_kept(model):
+    """By what forms on the way down to rest, and what was hung cold."""
+    problem = problem_for(model, [runs(model, rows=30)])
+    shares = 0.3, 0.0, 0.4, 0.0, 0.0
+    *_, anew = discrepancy._courses_along(problem, model.effects, (), shares).T
+    kept, oriented = problem.simulate_many([[*model.effects, effect_of(
+        model, 'formation_memory', kept=0.7, anew=form)] for form in (0.0, 1.0)])
+    assert anew == pytest.approx((oriented - kept) / 0.7)
+    *_, of_all = discrepancy._courses_along(problem, model.effects, ()).T
+    assert np.abs(anew - of_all).max() > 1e-4
