@@ -15,6 +15,7 @@ from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.kind import problem_for
 from hysteresis_ros.effects import catalogue
 from hysteresis_ros.errors import ParameterError
+from hysteresis_ros.measurements import Measurement
 from hysteresis_ros.operators import (
     cells, Kinetic, operator_from_dict, PrandtlIshlinskii, Preisach)
 from hysteresis_ros.report.words import verdict_in_words
@@ -290,6 +291,20 @@ def test_a_place_is_no_more_uncertain_than_the_bench_has_shown(model, factor, co
     plain, whole = problem.simulate_many([[], [own.with_values(share=1.0)]])
     assert discrepancy.kinetics_spread(problem, [own]) == pytest.approx(
         counts * 0.5 * (whole - plain))
+
+
+def test_what_kinetics_change_on_a_bench_is_that_of_an_oscillation_that_shrinks(model):
+    """From rest over the whole range to its middle, as of the paper's Fig. 7(a)."""
+    own = effect_of(model, 'kinetics', share=0.5)
+    turns = [0.0, 63 / 11, 6 / 11, 57 / 11, 12 / 11, 51 / 11, 18 / 11, 45 / 11, 24 / 11, 39 / 11,
+             30 / 11, 3.0]
+    volts = np.interp(np.arange(0.0, 11.0, 0.2), np.arange(12), turns)
+    bench = Measurement.from_columns({
+        'step': np.arange(55), 'trial': np.zeros(55), 'voltage': volts, 'length': np.zeros(55),
+        'force': np.full(55, model.surroundings.load)})
+    change = model.with_effects([own.with_values(share=1.0)]).predict(bench) - model.predict(bench)
+    assert discrepancy._kinetics_on_bench(model, own) == pytest.approx(
+        np.sqrt(np.mean(change ** 2)), rel=0.15)
 
 
 def test_a_bench_has_the_loads_of_its_tables(model):

@@ -344,16 +344,16 @@ def kinetics_spread(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarra
 
 def _kinetics_on_bench(model: MuscleModel, own: Kinetics) -> float:
     """Return what all of the kinetics change on a bench, root mean square of the length [m]."""
-    surroundings = model.surroundings
+    low, high = model.ranges[model.drive]
     loads = model.metrics.get('length', {}).get('identification', {}).get(
-        'loads') or [surroundings.load]
+        'loads') or [model.surroundings.load]
     ends = 0.5 + 0.5 * np.linspace(1.0, 0.0, SWINGS) * (-1.0) ** np.arange(1, SWINGS + 1)
     course = np.interp(np.arange(SWINGS * SWING_ROWS) / SWING_ROWS, np.arange(SWINGS), ends)
     rows = len(course)
     bench = Measurement.from_columns({
         'trial': np.repeat(np.arange(len(loads)), rows),
         'step': np.tile(np.arange(rows), len(loads)),
-        surroundings.drive: model.cold_drive + model.drive_range * np.tile(course, len(loads)),
+        model.drive: low + (high - low) * np.tile(course, len(loads)),
         'force': np.repeat(loads, rows), 'length': np.zeros(rows * len(loads))})
     others = [effect for effect in model.effects
               if effect.id != own.id and 'bench' in effect.kinds]
