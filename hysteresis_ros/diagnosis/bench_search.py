@@ -220,15 +220,18 @@ class BenchSearch:
         """
         Return fits of all that a loaded muscle has, and of parts of it from where that ended.
 
-        See `whole_sets`.
+        Of each kind of shift, in proportion to the load or to the strain, the form of the growth
+        that predicts loads left out best: rows fitted prefer another one; see `whole_sets`.
         """
         problem = self.fitter.problem
         begun = self._in_parallel(_begun_at_best, self.fitter, starts_together(
             problem.model.surroundings, self._names))
-        if not begun:
-            return []
-        whole = min(begun, key=lambda fit: self.fitter.error(fit.predicted))
-        return self._in_parallel(_fitted, self.fitter, subsets(whole.effects))
+        best: dict[bool, Fit] = {}
+        for fit in sorted(self.cross_validated(begun),
+                          key=lambda fit: problem.typical_error(fit.held_out)):
+            best.setdefault(any(effect.follows_strain for effect in fit.effects), fit)
+        return self._in_parallel(_fitted, self.fitter, [
+            effects for whole in best.values() for effects in subsets(whole.effects)])
 
     def _in_parallel(self, task: Callable[[BenchFitter, Any], Fit | None], fitter: BenchFitter,
                      items: Sequence) -> list[Fit]:

@@ -120,33 +120,22 @@ class BenchSelection:
                                   for name, note in vague.items() if name not in self.found.names})
 
     def _most_probable(self, fits: Sequence[Fit]) -> Fit:
-        """Of those that predict loads held out alike, return the most probable by rows fitted."""
+        """
+        Return the most probable fit by rows fitted and rows held out, of those that may predict.
+
+        Those are not sure to predict loads held out worse than the best one does: of a few loads
+        one may be predicted better by chance, and one that the others are extrapolated to may
+        outweigh all.
+        """
         best = min(fits, key=self.typical_error)
-        return max((fit for fit in fits if self._alike(fit, best)),
-                   key=lambda fit: self._fitted_log_odds(fit, self.base))
-
-    def _alike(self, fit: Fit, best: Fit) -> bool:
-        """
-        Whether a fit predicts loads held out no worse than the best one does.
-
-        By less than matters; or most loads better, and all by less than the standard error over
-        them: one that the others are extrapolated to may outweigh all others.
-        """
-        practical = self.settings.practical
-        squares = (self.problem.squares(one.held_out) + self.problem.small_error ** 2
-                   for one in (fit, best))
-        ratios = 0.5 * np.log(np.divide(*squares))
-        mean = float(np.mean(ratios))
-        if mean <= math.log1p(practical):
-            return True
-        most = np.mean(ratios < math.log1p(-practical)) > 0.5
-        return bool(most and mean <= np.std(ratios, ddof=1) / math.sqrt(len(ratios)))
+        return max((fit for fit in fits if self._as_good(fit, best)),
+                   key=lambda fit: self._all_log_odds(fit, best))
 
     def _judge(self, fits: Sequence[Fit], variants: Sequence[Fit]) -> list[Fit]:
         """
         Return fits that could be an answer, and single effects, with their held-out rows.
 
-        Those with another form of an equation only where held-out rows ask for it.
+        Those with another form of an equation only where all rows ask for it.
         """
         errors = {frozenset(fit.names): self.fitter.error(fit.predicted) for fit in fits}
         found = {fit.names: fit for fit in self._search.cross_validated([
@@ -155,8 +144,8 @@ class BenchSelection:
         for fit in self._search.cross_validated([
                 fit for fit in variants if says_more(fit) and self._determines(fit)]):
             simpler = found.get(fit.names)
-            if simpler is None or simpler.implausible() or self.typical_error(fit) < (
-                    1.0 - self.settings.practical) * self.typical_error(simpler):
+            if simpler is None or simpler.implausible() or (
+                    self._as_good(fit, simpler) and self._all_log_odds(fit, simpler) > 0.0):
                 found[fit.names] = fit
         return list(found.values())
 
@@ -207,7 +196,7 @@ class BenchSelection:
                     and not set(self.unstable).intersection(fit.names)
                     and self._as_good(fit, self.found)):
                 fitted = self._fitted_log_odds(fit, self.found)
-                together = fitted + self._log_odds(fit, self.found)
+                together = self._all_log_odds(fit, self.found)
                 if min(fitted, together) > 0.0:
                     fewer.append((together, fit))
         if not fewer:
@@ -372,6 +361,10 @@ class BenchSelection:
                          for one in (base, fit))
         return self._prior_log_odds(fit, base) + significance.schwarz_log_odds(
             before, after, count, self._parameters(fit) - self._parameters(base))
+
+    def _all_log_odds(self, fit: Fit, base: Fit) -> float:
+        """Return the sum of the log odds by rows held out and by rows fitted, of one question."""
+        return self._log_odds(fit, base) + self._fitted_log_odds(fit, base)
 
     def _prior_log_odds(self, fit: Fit, base: Fit) -> float:
         """

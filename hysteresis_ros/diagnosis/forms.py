@@ -114,14 +114,13 @@ class _FormFit:
         """
         Whether rows tell this form from another one.
 
-        As of sets: where those held out tell the two apart by less than what matters, those fitted
-        do.
+        As of sets: those held out and those fitted together, where the former are not sure to be
+        predicted worse.
         """
-        less = 1.0 - self._practical
-        if np.all(self._held_out < less * than._held_out):
-            return True
-        return bool(self._held_out[1] <= (1.0 + self._practical) * than._held_out[1]
-                    and self._fitted < less * than._fitted)
+        problem = self._fitter.problem
+        both = self._held_out[1] * self._fitted / (than._held_out[1] * than._fitted)
+        return bool(both < (1.0 - self._practical) ** 2 and problem.predicts_as_well(
+            self._fit.held_out, than._fit.held_out, self._practical))
 
 
 def _fitted(fitter: BenchFitter, effects: Sequence[Effect], forms: Forms) -> _FormFit:
@@ -146,8 +145,13 @@ def simplest_forms(effects: Sequence[Effect]) -> Forms:
 
 
 def other_forms(effects: Sequence[Effect]) -> list[Forms]:
-    """Return the forms, one at a time, that effects do not have of those to choose from."""
+    """
+    Return the forms, one at a time, that effects do not have of those to choose from.
+
+    Of a parameter between two forms, which is fitted where it is not neutral: its starts.
+    """
     return [{effect.id: {parameter.name: choice}} for effect in effects
             for parameter in effect.parameters if parameter.form and 'bench' in parameter.kinds
-            for choice in parameter.choices
+            and (parameter.choices or effect.values[parameter.name] == parameter.neutral)
+            for choice in parameter.choices or parameter.starts
             if choice not in (parameter.neutral, effect.values[parameter.name])]

@@ -41,9 +41,9 @@ def starts_together(surroundings: Surroundings, names: Collection[str]) -> list[
     Returns
     -------
     list of list of list of Effect
-        For each form of the growth with the load, starts: every shift by the load with every
-        scale of the growth, and loops that widen, narrow, or do neither. Empty without both a
-        shift and a growth.
+        For each form of the growth with the load, and of a shift that is in proportion to the load
+        or to the strain, starts: every shift by the load with every scale of the growth, and loops
+        that widen, narrow, or do neither. Empty without both a shift and a growth.
     """
     if not {StressDependence.id, StressDependentStrain.id} <= set(names):
         return []
@@ -56,10 +56,12 @@ def starts_together(surroundings: Surroundings, names: Collection[str]) -> list[
     if TransformationSlopes.id in names and TransformationSlopes.available(surroundings):
         wider = TransformationSlopes(surroundings)
         slopes = [[wider.with_values(g=g)] for g in (*_named(wider, 'g').starts, 0.0)]
-    return [[[shift.with_values(C=C, follows=0.0), growth.with_values(n=n, F0=F0), *some, *common]
+    return [[[shift.with_values(C=C, follows=follows), growth.with_values(n=n, F0=F0), *some,
+              *common]
              for C, F0, some in itertools.product(
                 _shifts(shift), _named(growth, 'F0').starts, slopes)]
-            for n in _named(growth, 'n').choices]
+            for n in _named(growth, 'n').choices
+            for follows in (0.0, *_named(shift, 'follows').starts)]
 
 
 def subsets(effects: list[Effect]) -> list[list[Effect]]:
