@@ -10,11 +10,11 @@ import pytest
 from scipy import optimize, sparse
 
 from hysteresis_ros.errors import IdentificationError
+from hysteresis_ros.identification import nonnegative
 from hysteresis_ros.identification.least_squares import (
     Anchor, fit_weights, folds_of, quick_weights, SLACK, solve_nonnegative, STRENGTHS,
     WEAKER_STRENGTHS)
-from hysteresis_ros.identification.nonnegative import solve_rows
-from hysteresis_ros.identification.nonnegative import extrapolated
+from hysteresis_ros.identification.nonnegative import extrapolated, solve_rows
 from hysteresis_ros.identification.smoothness import smoothness
 from hysteresis_ros.operators import cell_areas, signed_areas
 
@@ -87,6 +87,24 @@ def test_a_start_from_which_no_solution_is_found_is_given_up(size, seed):
     found, passive = solve_nonnegative(gram, moment, bound, rng.random(size) < 0.6)
     assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
     assert np.array_equal(passive, inside)
+
+
+@pytest.mark.parametrize('limits', [[], [3, 17]])
+def test_what_takes_too_long_is_solved_one_by_one(monkeypatch, limits):
+    """As after too many exchanges: whatever was found until then is not used."""
+    rng = np.random.default_rng(3)
+    rows = rng.normal(size=(60, 40))
+    gram, moment = rows.T @ rows + 1e-3 * np.eye(40), rows.T @ rng.normal(size=60)
+    free = np.isin(np.arange(40), limits)
+    expected, inside = solve_nonnegative(gram, moment, free)
+    assert np.any(expected == 0.0) and np.all(expected[limits] != 0.0)
+    monkeypatch.setattr(nonnegative, 'pivot', lambda gram, moment, free, passive, *_: (
+        np.full(40, np.nan), 2))
+    found, passive = solve_nonnegative(gram, moment, free)
+    assert found == pytest.approx(expected, abs=1e-12)
+    assert np.array_equal(passive, inside)
+    with pytest.raises(IdentificationError, match='use a larger strength'):
+        solve_nonnegative(-gram, moment, free)
 
 
 def test_solver_leaves_free_unknowns_without_a_bound():

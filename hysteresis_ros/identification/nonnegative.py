@@ -5,7 +5,7 @@
 from typing import Optional
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 from scipy.linalg import lapack
 
 from hysteresis_ros.errors import IdentificationError
@@ -35,7 +35,8 @@ def solve_nonnegative(
     Block principal pivoting (Portugal, Judice and Vicente 1994; Kim and Park 2011): unknowns of
     the wrong sign change sides together, one at a time when that stops helping, which makes it
     finite for a positive definite `gram`. It is much faster than adding unknowns one by one, and
-    a solution for a neighbouring problem is a good start.
+    a solution for a neighbouring problem is a good start. Finite may still be too long; then they
+    are added one by one (Lawson and Hanson, Solving Least Squares Problems, 1974, ch. 23).
 
     Parameters
     ----------
@@ -66,10 +67,26 @@ def solve_nonnegative(
     if state == SINGULAR:
         raise IdentificationError(NO_SOLUTION)
     if state:
-        raise IdentificationError(
-            'least squares: no solution found; use a larger strength or fewer levels')
+        x = _one_by_one(rows, moment, free)
+        passive = free | (x > 0.0)
     # The tolerance on signs is one of rounding: nothing below the bound is handed on.
     return np.where(free | (x > 0.0), x, 0.0), passive
+
+
+def _one_by_one(gram: np.ndarray, moment: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Return the solution (K,) of `solve_nonnegative` without a start."""
+    from scipy import optimize      # a third of a second that hardly any problem needs
+    try:
+        factor = linalg.cholesky(gram)
+        target = linalg.solve_triangular(factor, moment, trans='T')
+        # An unknown without a bound is the difference of two that have one.
+        found, _ = optimize.nnls(np.hstack([factor, -factor[:, free]]), target)
+    except (linalg.LinAlgError, RuntimeError):
+        raise IdentificationError('least squares: no solution found; use a larger strength or '
+                                  'fewer levels') from None
+    x: np.ndarray = found[:len(moment)]
+    x[free] -= found[len(moment):]
+    return x
 
 
 def solve_rows(design: np.ndarray, target: np.ndarray, penalty: sparse.csr_matrix,
