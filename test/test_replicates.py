@@ -11,9 +11,11 @@ import pytest
 
 from hysteresis_ros.diagnosis import discrepancy
 from hysteresis_ros.diagnosis.bench_effects import add_effects
+from hysteresis_ros.diagnosis.bench_error import missing_load
 from hysteresis_ros.diagnosis.bench_problem import BenchProblem
 from hysteresis_ros.diagnosis.extend import extend, extend_by_hand
 from hysteresis_ros.diagnosis.kind import problem_for
+from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.diagnosis.replicates import with_replicates
 from hysteresis_ros.diagnosis.settings import Settings
 from hysteresis_ros.identification.bench import identify
@@ -192,6 +194,29 @@ def test_the_discrepancy_has_the_mean_square_of_what_a_load_left_out_changes():
         problem_for(one, [runs(model)]), model.effects, own, Settings()).matrix()
         for one in (model, dataclasses.replace(model, replicates=[])))
     np.testing.assert_allclose(with_them - without, changes.T @ changes / 2.0, atol=1e-12)
+
+
+def test_what_a_load_left_out_changes_counts_as_far_as_the_load_is_from_the_others():
+    """At a load of the bench nothing, in the middle between two of equal distance a half."""
+    model, loads = small_model(), (1.0, 3.0, 5.0, 9.0)
+    known = dataclasses.replace(
+        model, replicates=2 * model.replicates, metrics={'length': {'left_out': {
+            'rmse': 1e-4, 'loads': list(loads), 'rmse_by_load': 4 * [1e-4]}}})
+    asked = np.array([3.0, 4.0, 7.0, 11.0, 0.5])
+    expected = np.array([0.0, 1.0, 2.0, 2.0, 0.5])[:, None] / np.array([2.0, 2.0, 2.0, 4.0])
+    np.testing.assert_allclose(missing_load(known, asked), expected)
+    # Where a replicate lacks a trial or two loads, or there are no loads between others.
+    for other in (model, dataclasses.replace(known, replicates=model.replicates),
+                  dataclasses.replace(known, metrics={})):
+        assert np.all(missing_load(other, asked) == 1.0)
+        assert missing_load(other, asked).shape == (5, len(other.replicates))
+    problem = problem_for(known, [runs(known)])
+    load = load_history(problem, known.effects).load
+    own = problem.simulate(known.effects)
+    changes = (problem.simulate_replicates(known.effects) - own).T / 2.0
+    along = discrepancy.discrepancy_along(problem, known.effects, own, Settings())
+    np.testing.assert_allclose(along.common, changes * missing_load(known, load), atol=1e-12)
+    assert np.max(np.abs(along.common)) > 1e-4
 
 
 def test_another_operator_of_a_replicate_counts():

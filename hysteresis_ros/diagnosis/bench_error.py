@@ -71,14 +71,48 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     at_loads = np.maximum(fitted[1], rows[1]) if len(rows[1]) == len(loads) else fitted[1]
     if len(verified[0]):
         at_loads = np.maximum(at_loads, np.interp(loads, verified[0], verified[1]))
-    gaps = np.diff(loads)
-    to_next = np.minimum(np.append(np.inf, gaps), np.append(gaps, np.inf))
     within = np.clip(load, loads[0], loads[-1])[:, None] - loads
-    near = np.exp(-0.5 * (within / np.median(gaps)) ** 2)
+    near = np.exp(-0.5 * (within / np.median(np.diff(loads))) ** 2)
     near /= np.sum(near, axis=1, keepdims=True)
+    away, to_next = _distances(loads, load)
     growth = near @ np.maximum(errors ** 2 - at_loads ** 2, 0.0) / (near @ to_next ** 2)
-    away = np.min(np.abs(load[:, None] - loads), axis=1)
     return np.sqrt(near @ at_loads ** 2 + growth * away ** 2)
+
+
+def missing_load(model: MuscleModel, load: np.ndarray) -> np.ndarray:
+    """
+    Return how far a load is from the bench's, over how far one of these is from the others.
+
+    What a load left out changes, it changes at its distance from the nearest one that stays. What
+    the bench lacks between two of its loads is half as far from these at most.
+
+    Parameters
+    ----------
+    model : MuscleModel
+    load : ndarray, shape (n,)
+        Tension of a muscle [N].
+
+    Returns
+    -------
+    ndarray, shape (n, R)
+        For each of the model's replicates; all 1 where they are not one for each of three loads or
+        more.
+    """
+    loads = np.array(model.metrics.get('length', {}).get('left_out', {}).get('loads', ()),
+                     dtype=float)
+    count = len(model.replicates)
+    if count < FEWEST_LOADS or len(loads) != count:
+        return np.ones((len(load), count))
+    away, to_next = _distances(loads, load)
+    shares: np.ndarray = away[:, None] / to_next
+    return shares
+
+
+def _distances(loads: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far loads (n,) are from the nearest of a bench (m,), and these from the next."""
+    gaps = np.diff(loads)
+    return (np.min(np.abs(load[:, None] - loads), axis=1),
+            np.minimum(np.append(np.inf, gaps), np.append(gaps, np.inf)))
 
 
 def relative_errors(model: MuscleModel, martensite: np.ndarray) -> np.ndarray:

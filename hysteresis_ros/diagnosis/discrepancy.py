@@ -12,8 +12,9 @@ It is known before the arm moves. With effects, their equations may be off as we
   responses and at drives between which the response does little, and differs between the directions
   of the drive.
 * What the loads of the bench say, they say of all rows of an arm at once. A load that the bench
-  lacks would change the model about as much as one that it has does when it is left out
-  (`model.replicates`; Efron, The Jackknife, the Bootstrap and Other Resampling Plans, 1982).
+  lacks would change the model as one that it has does when it is left out, but by less as it is
+  nearer to those that there are (`model.replicates`; Efron, The Jackknife, the Bootstrap and Other
+  Resampling Plans, 1982).
 * The bench holds the load still, while an arm's load moves with the wire: what a load does in the
   middle of a transformation the bench cannot tell. Models that agree on every bench table bound
   that. One of them feels the present load alone (`load_history`), in another one martensite keeps
@@ -39,7 +40,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hysteresis_ros.diagnosis.bench_error import (
-    drive_error, length_error, length_errors, relative_errors)
+    drive_error, length_error, length_errors, missing_load, relative_errors)
 from hysteresis_ros.diagnosis.load_history import load_history
 from hysteresis_ros.effects import (
     DriveEffect, Effect, Inputs, MaterialEffect, Parameter, Surroundings)
@@ -254,7 +255,7 @@ def discrepancy_along(problem: ArmProblem, effects: Sequence[Effect], predicted:
     parts = np.column_stack([bench, DIRECTIONAL * direction * bench,
                              SHARE_SPREAD * courses[:, FROM_LOADS],
                              kinetics_spread(problem, effects)])
-    common = left_out_changes(problem, effects)
+    common = left_out_changes(problem, effects, history.load)
     if room:
         common = np.column_stack([common, room_change(problem, effects)])
     return Discrepancy(
@@ -369,11 +370,14 @@ def _change_by(effect: Effect, problem: ArmProblem, effects: Sequence[Effect]) -
     return change
 
 
-def left_out_changes(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarray:
+def left_out_changes(problem: ArmProblem, effects: Sequence[Effect], load: np.ndarray
+                     ) -> np.ndarray:
     """
-    Return what the response would change by without each of the bench's loads.
+    Return what the response may be off by for what each of the bench's loads says.
 
-    Divided by the root of their number, so that the sum of their squares is the mean square.
+    What it would change by without that load, in proportion to how far the arm's load is from those
+    that there are. Divided by the root of their number, so that the sum of their squares is the
+    mean square.
 
     Parameters
     ----------
@@ -381,6 +385,8 @@ def left_out_changes(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarr
         Rows and model.
     effects : sequence of Effect
         All effects of the model.
+    load : ndarray, shape (n,)
+        Tension of each muscle [N].
 
     Returns
     -------
@@ -388,7 +394,8 @@ def left_out_changes(problem: ArmProblem, effects: Sequence[Effect]) -> np.ndarr
     """
     responses = problem.simulate_replicates(effects)
     own, = problem.simulate_many([effects])
-    return ((responses - own) / math.sqrt(max(len(responses), 1))).T
+    changes: np.ndarray = ((responses - own) / math.sqrt(max(len(responses), 1))).T
+    return changes * missing_load(problem.model, load)
 
 
 def room_is_calm(problem: ArmProblem, discrepancy: Discrepancy) -> bool:
