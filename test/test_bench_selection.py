@@ -114,6 +114,26 @@ def test_a_single_load_that_others_are_extrapolated_to_does_not_decide_alone(
     assert (selection._most_probable([best, other]) is other) == probable
 
 
+@pytest.mark.parametrize('most, last, fitted, chosen', [
+    (0.3, 0.4, 0.2, True), (0.3, 0.4, 0.29, False), (0.3, 0.2, 0.31, True),
+    (0.3, 0.2, 0.4, False), (0.32, 0.33, 0.1, False)])
+def test_another_form_of_a_set_needs_all_rows(
+        selection, monkeypatch, most, last, fitted, chosen):
+    """Rows fitted and loads held out together, and none that is surely predicted worse."""
+    problem, names = selection.problem, ('slack', 'fatigue')
+    simpler = of_share(selection, names, 0.3, 0.3)
+    shares = np.where(problem.fold == problem.folds[-1], last, most)
+    other = dataclasses.replace(
+        of_share(selection, names, 0.3, fitted),
+        held_out=problem.measured + shares * (selection.base.held_out - problem.measured))
+    monkeypatch.setattr(selection._search, 'cross_validated', list)
+    monkeypatch.setattr(selection, '_determines', lambda fit: True)
+    for name in ('all_help', 'says_more'):
+        monkeypatch.setattr(f'{BenchSelection.__module__}.{name}', lambda *_: True)
+    found, = selection._judge([simpler], [other])
+    assert (found is other) == chosen
+
+
 @pytest.mark.parametrize('most, last, fitted, fewer', [
     (0.3, 0.5, 0.3, True), (0.32, 0.33, 0.3, False), (0.3, 3.0, 0.3, False),
     (0.3, 0.5, 0.6, False)])

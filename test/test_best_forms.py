@@ -60,3 +60,11 @@ def test_the_form_is_that_which_fitted_and_held_out_rows_ask_for(
     growth = effect_of(bicep_model(), 'stress_dependent_strain', r=0.6, n=present)
     found, = forms.with_best_forms(Fitter(problem), [growth])
     assert found.n == chosen
+
+
+def test_a_form_between_two_begins_where_its_parameter_is_fitted():
+    """A share that has come out as none is not fitted again by itself."""
+    def shift(follows):
+        return effect_of(bicep_model(), 'stress_dependence', C=0.8, follows=follows)
+    assert forms.other_forms([shift(0.0)]) == [{'stress_dependence': {'follows': 0.5}}]
+    assert forms.other_forms([shift(0.7)]) == []

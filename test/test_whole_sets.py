@@ -5,6 +5,7 @@
 import numpy as np
 import pytest
 
+from hysteresis_ros.diagnosis.arm_fit import Fit
 from hysteresis_ros.diagnosis.bench_search import BenchSearch
 from hysteresis_ros.diagnosis.diagnose import diagnose
 from hysteresis_ros.diagnosis.settings import Settings
@@ -84,6 +85,32 @@ def test_the_whole_is_fitted_to_the_noise(wire):
     assert len(fits) == 8
     slopes, = (effect for effect in whole.effects if effect.id == 'transformation_slopes')
     assert slopes.g == pytest.approx(0.25, abs=0.02)
+
+
+def test_of_each_kind_of_shift_the_form_that_predicts_loads_left_out_is_taken_apart(
+        wire, monkeypatch):
+    """Rows fitted would prefer others."""
+    search = search_of(wire)
+    measured, taken = search.fitter.problem.measured, []
+
+    def begun(n, follows, held_out, fitted):
+        effects = [effect.with_values(follows=follows) if effect.id == 'stress_dependence'
+                   else effect.with_values(n=n) if effect.id == 'stress_dependent_strain'
+                   else effect for effect in wire.effects]
+        return Fit(effects, np.zeros(0), measured + fitted, held_out=measured + held_out)
+    fits = [begun(1.0, 0.0, 3e-4, 2e-4), begun(2.0, 0.0, 5e-4, 1e-4),
+            begun(1.5, 1.0, 4e-4, 1e-4), begun(4.0, 0.7, 2e-4, 3e-4)]
+
+    def in_parallel(task, fitter, items):
+        if task.__name__ == '_begun_at_best':
+            return fits
+        if task.__name__ == '_fitted':
+            taken.extend(items)
+        return list(items)
+    monkeypatch.setattr(search, '_in_parallel', in_parallel)
+    assert search._together() == taken and len(taken) == 16
+    assert {tuple(value for effect in effects for name, value in effect.values.items()
+                  if name in ('follows', 'n')) for effects in taken} == {(0.0, 1.0), (0.7, 4.0)}
 
 
 def test_nothing_is_tried_together_without_a_load(wire):
