@@ -89,8 +89,9 @@ def missing_load(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     model : MuscleModel
+        With its replicates.
     load : ndarray, shape (n,)
-        Tension of a muscle [N].
+        Of each muscle [N].
 
     Returns
     -------
