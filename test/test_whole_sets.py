@@ -82,7 +82,8 @@ def test_the_whole_is_fitted_to_the_noise(wire):
                 key=lambda fit: search_of(wire).fitter.error(fit.predicted))
     search = search_of(wire)
     assert search.fitter.error(whole.predicted) < 4e-5
-    assert len(fits) == 8
+    # Of either kind of shift, which these rows do not tell apart.
+    assert len(fits) == 16
     slopes, = (effect for effect in whole.effects if effect.id == 'transformation_slopes')
     assert slopes.g == pytest.approx(0.25, abs=0.02)
 

@@ -121,21 +121,42 @@ class BenchSelection:
 
     def _most_probable(self, fits: Sequence[Fit]) -> Fit:
         """
-        Return the most probable fit by rows fitted and rows held out, of those that may predict.
+        Return the most probable fit of those that predict loads held out alike, by rows fitted.
 
-        Those are not sure to predict loads held out worse than the best one does: of a few loads
-        one may be predicted better by chance, and one that the others are extrapolated to may
-        outweigh all.
+        Or one with as many effects that only some muscles have, if it is more probable by rows
+        held out and by rows fitted together, and not sure to predict the former worse. Which form
+        an equation has, and what every loaded muscle has besides, needs no difference that matters.
         """
         best = min(fits, key=self.typical_error)
-        return max((fit for fit in fits if self._as_good(fit, best)),
-                   key=lambda fit: self._all_log_odds(fit, best))
+        alike = max((fit for fit in fits if self._alike(fit, best)),
+                    key=lambda fit: self._fitted_log_odds(fit, self.base))
+        rivals = [fit for fit in fits if not_universal(fit) == not_universal(alike)
+                  and self._as_good(fit, best)]
+        return max([alike, *rivals], key=lambda fit: self._all_log_odds(fit, alike))
+
+    def _alike(self, fit: Fit, best: Fit) -> bool:
+        """
+        Whether a fit predicts loads held out no worse than the best one does.
+
+        By less than matters; or most loads better, and all by less than the standard error over
+        them: one that the others are extrapolated to may outweigh all others.
+        """
+        practical = self.settings.practical
+        squares = (self.problem.squares(one.held_out) + self.problem.small_error ** 2
+                   for one in (fit, best))
+        ratios = 0.5 * np.log(np.divide(*squares))
+        mean = float(np.mean(ratios))
+        if mean <= math.log1p(practical):
+            return True
+        most = np.mean(ratios < math.log1p(-practical)) > 0.5
+        return bool(most and mean <= np.std(ratios, ddof=1) / math.sqrt(len(ratios)))
 
     def _judge(self, fits: Sequence[Fit], variants: Sequence[Fit]) -> list[Fit]:
         """
         Return fits that could be an answer, and single effects, with their held-out rows.
 
-        Those with another form of an equation only where all rows ask for it.
+        Those with another form of an equation only where held-out rows ask for it; of what every
+        loaded muscle has, where these and the rows fitted together do.
         """
         errors = {frozenset(fit.names): self.fitter.error(fit.predicted) for fit in fits}
         found = {fit.names: fit for fit in self._search.cross_validated([
@@ -144,10 +165,16 @@ class BenchSelection:
         for fit in self._search.cross_validated([
                 fit for fit in variants if says_more(fit) and self._determines(fit)]):
             simpler = found.get(fit.names)
-            if simpler is None or simpler.implausible() or (
-                    self._as_good(fit, simpler) and self._all_log_odds(fit, simpler) > 0.0):
+            if simpler is None or simpler.implausible() or self._better_form(fit, simpler):
                 found[fit.names] = fit
         return list(found.values())
+
+    def _better_form(self, fit: Fit, simpler: Fit) -> bool:
+        """Whether rows ask for other forms of the same effects; see `_judge`."""
+        if self.typical_error(fit) < (1.0 - self.settings.practical) * self.typical_error(simpler):
+            return True
+        return bool(not not_universal(fit) and self._as_good(fit, simpler)
+                    and self._all_log_odds(fit, simpler) > 0.0)
 
     def _leave_out_chance(self) -> bool:
         """
