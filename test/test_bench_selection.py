@@ -139,6 +139,20 @@ def test_another_form_of_what_every_muscle_has_needs_all_rows(
     assert (found is other) == chosen
 
 
+@pytest.mark.parametrize('other, chosen', [
+    (('stress_dependence', 'series_compliance'), True), (('stress_dependence', 'slack'), False)])
+def test_rows_fitted_do_not_make_up_for_a_rare_effect_that_hardly_matters(
+        selection, other, chosen):
+    """Of what every loaded muscle has they do, where a load may be predicted worse by chance."""
+    problem, base = selection.problem, selection.base
+    best = of_share(selection, ('stress_dependence',), 0.3, 0.3)
+    rival = of_share(selection, other, 0.34, 0.1)
+    shares = np.where(problem.fold == problem.folds[-1], 0.5, 0.29)
+    rival = dataclasses.replace(
+        rival, held_out=problem.measured + shares * (base.held_out - problem.measured))
+    assert (selection._most_probable([best, rival]) is rival) == chosen
+
+
 @pytest.mark.parametrize('most, last, fitted, fewer', [
     (0.3, 0.5, 0.3, True), (0.32, 0.33, 0.3, False), (0.3, 3.0, 0.3, False),
     (0.3, 0.5, 0.6, False)])
