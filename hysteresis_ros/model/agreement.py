@@ -43,9 +43,10 @@ class KnownPhases:
 
     def __init__(self, phase: np.ndarray) -> None:
         self._phases: deque[np.ndarray] = deque([phase], MOST_KEPT)
-        # Of each run the values of all parameters that have occurred, NaN of those absent.
+        # Of each run the values of all parameters that have occurred, NaN of those absent, and how
+        # many it has.
         self._places: dict[tuple[str, str], int] = {}
-        self._values = np.zeros((1, 0))
+        self._values, self._sizes = np.zeros((1, 0)), np.zeros(1)
 
     def copy(self) -> KnownPhases:
         """Return what is known now, to go back to."""
@@ -63,16 +64,20 @@ class KnownPhases:
         row = self._row(effects)
         missing = np.full((len(self._values), len(row) - self._values.shape[1]), np.nan)
         self._values = np.vstack((np.hstack((self._values, missing)), row))[-MOST_KEPT:]
+        self._sizes = np.append(self._sizes, np.sum(np.isfinite(row)))[-MOST_KEPT:]
         self._phases.append(phase)
 
     def nearest(self, effects: Sequence[Effect]) -> np.ndarray:
         """Return the phase (rows,) of the run with the most similar effects, of these the last."""
-        values = self._row(effects)[:self._values.shape[1]]
+        row = self._row(effects)
+        own = np.flatnonzero(np.isfinite(row))
+        values, kept = row[own], self._values[:, own]
         with np.errstate(invalid='ignore', divide='ignore'):
-            apart = np.abs(self._values - values) / (np.abs(self._values) + np.abs(values))
-        absent, without = np.isnan(self._values), np.isnan(values)
-        apart = np.where(absent | without, absent != without, np.nan_to_num(apart))
-        return self._phases[-1 - int(np.argmin(np.sum(apart, axis=1)[::-1]))]
+            apart = np.nan_to_num(np.abs(kept - values) / (np.abs(kept) + np.abs(values)))
+        # A value that only one of the two has counts 1: as many as both have, of which these are
+        # the same for all runs, less twice those in common.
+        apart -= 2.0 * np.isfinite(kept)
+        return self._phases[-1 - int(np.argmin((self._sizes + np.sum(apart, axis=1))[::-1]))]
 
     def _row(self, effects: Sequence[Effect]) -> np.ndarray:
         row = np.full(len(self._places), np.nan)
