@@ -99,7 +99,8 @@ def test_what_rows_do_not_determine_stays_as_loads_left_out_have_it(usual, monke
     assert any(effect is kept for effect in found)
 
 
-@pytest.mark.parametrize('known_before', [True, False])
+@pytest.mark.parametrize('known_before', [
+    pytest.param(True, marks=pytest.mark.long), False])
 def test_a_form_that_rows_do_not_determine_takes_no_place_of_one_that_they_do(
         usual, known_before, monkeypatch):
     growth = effect_of(usual, 'stress_dependent_strain', r=0.5, F0=0.6)

@@ -401,6 +401,7 @@ def test_what_every_loaded_muscle_has_is_tried_in_all_its_forms(selection, monke
             and effects[1].id == 'stress_dependent_strain'} >= {2.0, 4.0}
 
 
+@pytest.mark.slow
 def test_sets_are_tried_in_the_simplest_forms_of_their_equations(selection, monkeypatch):
     """A form that fitted rows prefer may predict a load that is left out far worse."""
     search, kinds = selection._search, catalogue()

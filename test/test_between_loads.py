@@ -102,6 +102,7 @@ def test_sets_have_the_simplest_forms(fitter, effects, monkeypatch):
     assert all(one.values.get('follows', 0.0) == 0.0 for some in seen for one in some)
 
 
+@pytest.mark.long
 def test_a_bench_that_proves_nothing_has_them(model, tables, monkeypatch):
     """And with them predicts the trials that were not fitted better."""
     nothing = dataclasses.make_dataclass('Nothing', [('effects', list)])([])

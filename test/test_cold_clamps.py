@@ -180,6 +180,7 @@ def test_it_is_there_for_heated_wires_with_a_preisach_operator():
         clamped(0.1, model=model).predict(arm_run([1.0, 2.0]))
 
 
+@pytest.mark.slow
 def test_it_is_named_with_its_size_and_not_for_another():
     tried = ['cold_clamps', 'airflow', 'unequal_muscles', 'fatigue', 'slack']
     found = diagnose(MODEL, [runs(clamped(0.08), trials=3, rows=30)], tried)
@@ -234,7 +235,8 @@ def test_it_is_found_on_an_arm_of_the_laboratory(strength):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', ['unequal_muscles', 'airflow'])
+@pytest.mark.parametrize('name', [
+    pytest.param('unequal_muscles', marks=pytest.mark.long), 'airflow'])
 def test_it_is_not_named_where_the_arm_has_another(name):
     tried = ['cold_clamps', 'airflow', 'unequal_muscles', 'fatigue', 'slack', 'stress_dependence']
     assert found_in({name: 1.0}, 4, tried, 'arm-steps').missing == [name]

@@ -130,6 +130,7 @@ def test_white_noise_is_estimated_from_the_residuals(noise):
     assert found[1] < noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('drift', [0.0, 0.02])
 def test_noise_is_at_most_what_is_said_in_nine_of_ten_or_more(drift):
     """
@@ -167,6 +168,7 @@ def test_drift_is_estimated_with_its_time(rho):
     assert np.median(times) == pytest.approx(expected, abs=0.7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('noise, rho', [(0.003, 0.0), (0.03, 0.0), (0.03, 0.9), (0.1, 0.98)])
 def test_no_other_values_are_much_more_probable(noise, rho):
     """Of those that a general optimiser comes to, from the default starts and from one far away."""

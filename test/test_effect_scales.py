@@ -53,6 +53,7 @@ def test_the_paper_s_own_muscle_and_arm_have_the_ranges_that_are_written_down():
             assert own.unit == written.unit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('scale', [BIG, SMALL])
 @pytest.mark.parametrize('name', sorted(set(catalogue()) - UNLIKE))
 def test_at_another_scale_an_effect_of_usual_size_does_the_same_to_the_angle(name, scale):

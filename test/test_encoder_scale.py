@@ -47,6 +47,7 @@ def test_an_encoder_set_by_eye_to_the_upright_or_the_hanging_arm_is_plausible():
     assert catalogue()['encoder_scale'](k=1.2, theta_0=-60.0).implausible() == ['theta_0']
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('k, theta_0', [(0.8, 140.0), (1.25, 60.0), (2.0, 90.0)])
 def test_it_is_named_with_its_size(k, theta_0):
     model = bicep_model()

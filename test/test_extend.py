@@ -322,6 +322,7 @@ def test_what_happens_in_the_course_of_a_recording_holds_for_its_other_trials(ba
     assert found.test['rmse_after'] < 0.1 * found.test['rmse_before']
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('names', [
     ('wire_break', 'backlash'), ('wire_break', 'coulomb_friction'), ('wire_break', 'fatigue')])
 @pytest.mark.parametrize('turned', [False, True])

@@ -54,6 +54,7 @@ def test_it_is_said_besides_what_is_missing(model):
     assert found.effects[0].values['dm'] == pytest.approx(40.0, abs=4.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name, values', [
     ('payload_error', {'dm': 40.0}), ('encoder_offset', {'offset': 3.0})])
 def test_nothing_is_said_of_a_wire_that_keeps_nothing(model, name, values):

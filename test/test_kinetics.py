@@ -245,6 +245,7 @@ def recorded(model, share, *effects):
     return with_noise(clean, NOISE * np.random.default_rng(4).standard_normal(clean.rows))
 
 
+@pytest.mark.slow
 def test_minor_loops_that_stay_open_are_no_fault_of_the_arm_but_said(model, monkeypatch):
     measured = recorded(model, 0.8)
     found = diagnose(model, [measured], TRIED)

@@ -85,7 +85,8 @@ def test_arm_tables(tmp_path, name, least, most):
         assert abs(np.mean(table.column('supply_voltage')) - 12.0) < 0.01
 
 
-@pytest.mark.parametrize('name', ['bench', 'arm-steps'])
+@pytest.mark.parametrize('name', [
+    'bench', pytest.param('arm-steps', marks=pytest.mark.long)])
 def test_same_seed_same_tables(name):
     """The tables are those of the seed; train and test differ."""
     tables = [experiment_tables(name, {'creep': 0.4}, seed) for seed in (6, 6, 7)]

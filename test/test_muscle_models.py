@@ -365,6 +365,7 @@ def test_experiments_with_another_muscle():
         experiment_tables('bench', muscle='auricchio')
 
 
+@pytest.mark.slow
 def test_slopes_and_strain_growth_can_be_scaled():
     """`stress_dependence` and `stress_dependent_strain` are scaled constants of the model."""
     material = LagoudasMaterial()

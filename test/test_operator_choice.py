@@ -214,7 +214,8 @@ def test_the_command_prints_a_table_writes_json_and_draws(tmp_path, capsys, monk
 @pytest.mark.slow
 @pytest.mark.parametrize('name, kept, worst', [
     ('piezo/stack_nested_loops.csv', 'Bouc-Wen', 0.02),
-    ('sma_react/nitihf_isobaric.csv', 'two-stage Preisach N = 10', 0.25)])
+    pytest.param('sma_react/nitihf_isobaric.csv', 'two-stage Preisach N = 10', 0.25,
+                 marks=pytest.mark.long)])
 def test_real_measurements_are_better_than_the_line(name, kept, worst):
     from hysteresis_ros.measurements import read_measurement
     if not (DATA / name).exists():

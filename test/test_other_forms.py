@@ -22,6 +22,9 @@ from test_transformation_slopes import bench_tables
 
 pytestmark = pytest.mark.slow
 LONG = pytest.mark.long
+# Of all effects those that a creeping muscle, or one that feels another voltage, may be taken for.
+NEAR_CREEP = ('creep', 'fatigue', 'ambient_drift')
+NEAR_VOLTAGE = ('pwm_dead_zone', 'supply_sag', 'supply_limit', 'heat_loss', 'stress_dependence')
 
 
 def named(found):
@@ -92,7 +95,8 @@ def test_creep_by_another_law_is_creep(monkeypatch, form):
     assert found.rmse_after < 0.5 * found.rmse_before
 
 
-@pytest.mark.parametrize('rested', [pytest.param(True, marks=LONG), False])
+@LONG
+@pytest.mark.parametrize('rested', [True, False])
 def test_creep_that_outlasts_its_hold_is_creep(monkeypatch, rested):
     """A relaxation of 90 s in holds of 30 s; the cold muscle may creep when a trial begins."""
     begin_trial, crept = ParallelWires._begin, {}
@@ -136,9 +140,10 @@ def test_creep_that_a_settled_bench_contains_is_found(monkeypatch):
     assert found.rmse_after < 0.2 * found.rmse_before
 
 
-@pytest.mark.parametrize('protocol', [
-    'arm-steps', pytest.param('arm-dynamic', marks=LONG)])
-def test_creep_that_is_as_large_after_a_small_step_is_creep(monkeypatch, protocol):
+@pytest.mark.parametrize('protocol, names', [
+    ('arm-steps', NEAR_CREEP), pytest.param('arm-steps', None, marks=LONG),
+    pytest.param('arm-dynamic', None, marks=LONG)])
+def test_creep_that_is_as_large_after_a_small_step_is_creep(monkeypatch, protocol, names):
     """Of 0.3 percent of the length in a hold of 30 s, however much has transformed."""
     creep_on = ParallelWires._creep_on
 
@@ -148,7 +153,7 @@ def test_creep_that_is_as_large_after_a_small_step_is_creep(monkeypatch, protoco
         self._creep = (0.0012 * length * math.tanh((self._share - self._run_share) / 0.09)
                        * math.log1p(self._since / 2.0))
     monkeypatch.setattr(ParallelWires, '_creep_on', otherwise)
-    found = found_in({'creep': 1.0}, 5, protocol=protocol, trials=(0, 1))
+    found = found_in({'creep': 1.0}, 5, names, protocol=protocol, trials=(0, 1))
     assert (found.verdict, found.missing) == ('missing', ['creep'])
     made = {effect.id: effect for effect in found.effects}
     assert made['creep'].s > 0.0
@@ -181,11 +186,13 @@ def test_heat_that_is_lost_otherwise_than_on_the_bench_is_heat_loss(monkeypatch,
     assert found.rmse_after < 0.4 * found.rmse_before
 
 
-def test_pulses_that_drop_out_and_pass_whole_above_are_a_dead_zone(monkeypatch):
+@pytest.mark.parametrize('names', [NEAR_VOLTAGE, pytest.param(None, marks=LONG)],
+                         ids=['some', 'all'])
+def test_pulses_that_drop_out_and_pass_whole_above_are_a_dead_zone(monkeypatch, names):
     """No rest of them is stretched."""
     change_drive(monkeypatch, 'dead_voltage', 0.0,
                  lambda voltage, _: 0.0 if voltage < 3.6 else voltage)
-    found = found_in({'pwm_dead_zone': 1.0}, 5, protocol='arm-steps', trials=(0, 1))
+    found = found_in({'pwm_dead_zone': 1.0}, 5, names, protocol='arm-steps', trials=(0, 1))
     assert (found.verdict, found.missing) == ('missing', ['pwm_dead_zone'])
     assert found.effects[0].whole == 1.0
     assert found.effects[0].Vd == pytest.approx(3.6, rel=0.1)

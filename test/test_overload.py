@@ -262,6 +262,7 @@ def test_a_fit_starts_where_the_residual_goes_another_way(row):
     assert any(start['t'] == moment and start['compliance'] == 0.0 for start in starts)
 
 
+@pytest.mark.slow
 def test_what_is_only_longer_from_a_moment_on_is_unknown():
     """A crimp may have slipped; the wire has lost nothing."""
     tried = ['overload', 'slack', 'fatigue', 'payload_error']

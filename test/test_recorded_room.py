@@ -179,6 +179,7 @@ def test_a_bench_whose_room_was_recorded_says_what_the_reference_is(tmp_path):
     assert AmbientTemperature.describe(MODEL.surroundings) == AmbientTemperature.parameters
 
 
+@pytest.mark.slow
 def test_of_a_bench_in_the_same_room_nothing_else_is_taken_for_it():
     """And of one in another room nothing else is named."""
     model = bicep_model(ranges={**MODEL.ranges, 'ambient_temperature': (21.8, 22.2)})
@@ -238,6 +239,7 @@ class Asked(Exception):
     """What was asked of a diagnosis that nobody has the time for."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('swing, recorded, counts', [
     (3.0, True, True), (3.0, False, False), (0.1, True, False)])
 def test_a_recorded_room_acts_while_a_bench_is_diagnosed(monkeypatch, swing, recorded, counts):

@@ -141,6 +141,7 @@ def test_a_pair_that_is_stuck_is_fitted_from_all_starts(monkeypatch):
     assert found.sets.fits[names].log_evidence > good.log_evidence - 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('change, tried', [(0.0, []), (0.2, [2])])
 def test_all_starts_are_tried_where_nothing_suffices(model, monkeypatch, change, tried):
     sizes = []
@@ -204,6 +205,7 @@ def without_the_planted_pair():
     return found, found.sets.fits.pop(PLANTED).log_evidence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('fails', ['linearised', 'as started'])
 def test_one_effect_of_the_answer_is_exchanged_for_a_better_one(monkeypatch, fails):
     """A fan is a sag to an arm at rest; in its place the sag is found, by either score."""
@@ -261,6 +263,7 @@ def late(model):
     return selection(model, measured, LAGS)
 
 
+@pytest.mark.slow
 def test_an_equation_begins_also_where_the_one_that_it_contains_has_ended(late):
     """With all forms that it has, once each."""
     lag, = late.sets.fits[frozenset(['thermal_lag'])].effects
@@ -349,6 +352,7 @@ def test_of_what_changes_much_the_start_that_is_nearest_is_tried(model):
     assert error > scored['payload_error',][0]
 
 
+@pytest.mark.slow
 def test_what_is_not_physical_is_exchanged_for_what_it_stands_for(monkeypatch):
     """A fan that would have to blow harder than any does is the sag."""
     found, before = without_the_planted_pair()

@@ -135,6 +135,8 @@ def watched(self, *args, **kwargs):
 Dispatcher._compile_for_args = watched
 length, force = experiment_tables('bench', seed=4).values()
 length, force = length if 'length' in length else force, force if 'length' in length else length
+length, force = ({name: values[::3] for name, values in table.items()}
+                 for table in (length, force))
 identify(length, force, length_trials=[0, 2], effects=['stress_dependent_strain'])
 identify({name: values[:40] for name, values in length.items()}, operator='bouc-wen')
 effects = ['thermal_lag', 'latent_heat', 'creep', 'inertia', 'wire_break', 'coulomb_friction']

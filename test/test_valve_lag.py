@@ -96,6 +96,7 @@ def test_it_is_tried_only_on_recordings_in_motion():
     assert 'valve_lag' not in names and unobservable['valve_lag'] == 'every row is settled'
 
 
+@pytest.mark.slow
 def test_it_is_named_with_both_times():
     made = catalogue()['valve_lag'](bladder().surroundings, filling=0.6, venting=1.8)
     tried = ['valve_lag', 'creep', 'fatigue']
