@@ -37,7 +37,14 @@ NODES = ('test_architecture', 'test_background', 'test_bag', 'test_benchmark', '
          'test_other_master', 'test_outputs', 'test_packaging', 'test_protection', 'test_recording',
          'test_start_up', 'test_studio_live', 'test_workers')
 
-# Ten seconds and more of a core each, with little that shorter tests do not show: marked as long.
+# Searches of what acts on an arm or a bench, and what they compare. All that they call, and whole
+# diagnoses by the command line, are tested with every set of versions; these with one.
+SEARCHES = ('test_arm_verdict', 'test_bench_selection', 'test_covariance',
+            'test_events', 'test_extend', 'test_fitted_sets', 'test_kept_strain',
+            'test_linearised', 'test_monitor', 'test_recorded_room', 'test_selection',
+            'test_set_fitter', 'test_valid_sets')
+
+# Five seconds and more of a core each, with little that shorter tests do not show: marked as long.
 LONG = ('test_fault_on_the_machine_code', 'test_a_pulled_cable_of_the_machine_code_likewise',
         'test_the_fuzzers_find_code_that_is_wrong', 'test_libfuzzer_finds_nothing_at_once',
         'test_a_damaged_file_is_compiled_anew', 'test_a_change_in_a_called_function_is_seen',
@@ -54,7 +61,19 @@ LONG = ('test_fault_on_the_machine_code', 'test_a_pulled_cable_of_the_machine_co
         'test_sets_that_fit_badly_on_the_coarse_grid_are_not_lost',
         'test_intervals_under_noise_that_lasts_hold_the_truth_as_often_as_they_say',
         'test_the_recording_gives_the_same_answer',
-        'test_the_notebook_goes_from_the_bench_to_the_extended_model')
+        'test_the_notebook_goes_from_the_bench_to_the_extended_model',
+        'test_two_effects_that_one_could_explain_are_found_as_a_pair',
+        'test_angles_shifted_after_the_recording_are_late',
+        'test_a_room_that_is_heated_in_turns_drifts',
+        'test_weights_that_follow_steps_show_them_too',
+        'test_kinetics_stay_with_what_is_found',
+        'test_a_load_says_nothing_of_the_model_without_it',
+        'test_its_level_is_that_of_an_f_test_with_a_row_for_each_block',
+        'test_autocorrelated_noise_is_seldom_taken_for_an_effect',
+        'test_on_a_bench_with_a_constant_slope_it_stays_constant',
+        'test_an_effect_more_has_to_be_more_probable_than_none',
+        'test_after_an_installation_nothing_is_compiled_by_a_command',
+        'test_a_bench_shows_it_and_that_a_growth_was_in_part_a_softer_martensite')
 
 # Tests of other runs on the same network must not be heard; rclpy reads this at its start.
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
@@ -72,13 +91,13 @@ hypothesis.settings.load_profile('suite')
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what `-m "not slow"`, "not nodes" and "not long" leave out; all that is long is slow."""
+    """Mark what `-m "not slow"` and its like leave out; all that is long is slow."""
     for item in items:
         if not {item.name, getattr(item, 'originalname', None)}.isdisjoint(LONG):
             item.add_marker('long')
         if item.get_closest_marker('long'):
             item.add_marker('slow')
-        for marker, stems in (('slow', SLOW), ('nodes', NODES)):
+        for marker, stems in (('slow', SLOW), ('nodes', NODES), ('searches', SEARCHES)):
             if item.path.stem in stems:
                 item.add_marker(marker)
 
