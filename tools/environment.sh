@@ -38,12 +38,36 @@ if [ "$(cat "$folder/identity" 2>/dev/null)" != "$identity" ]; then
 fi
 
 # What is never imported need not be compiled to bytecode, which takes as long as all the rest.
-install() {
+pip_install() {
     "$folder/bin/python" -m pip install -qq --disable-pip-version-check --no-compile \
         ${constraints:+--constraint "$constraints"} "$@"
 }
 # Resolving takes the pip that comes with Python 3.11 and 3.12 minutes.
-install --upgrade pip || echo "$folder keeps the pip that it came with" >&2
+upgrade_pip() {
+    pip_install --upgrade pip || echo "$folder keeps the pip that it came with" >&2
+}
+install() {
+    if [ -n "$uv" ]; then
+        "$uv" pip install -q --python "$folder/bin/python" \
+            ${constraints:+--constraint "$constraints"} "$@" && return
+        echo 'uv could not install that: pip does' >&2
+        uv=''
+        upgrade_pip
+    fi
+    pip_install "$@"
+}
+
+# uv takes a quarter of pip's time. It sees neither the machine's own packages nor another index that
+# pip was told of, where pip does all.
+uv=''
+case ,$extras, in
+    *,ros,*)
+        if ! "$folder/bin/python" -m pip config list | grep '[.]index-url=' >/dev/null &&
+                pip_install uv; then
+            uv=$folder/bin/uv
+        fi ;;
+esac
+[ -n "$uv" ] || upgrade_pip
 # colcon still calls `setup.py install`, which setuptools 80 gave up; colcon-core bounds it, too.
 install 'setuptools<80'
 colcon='colcon-core colcon-ros colcon-output colcon-package-information colcon-package-selection
