@@ -66,6 +66,7 @@ LONG = ('test_fault_on_the_machine_code', 'test_a_pulled_cable_of_the_machine_co
         'test_angles_shifted_after_the_recording_are_late',
         'test_a_room_that_is_heated_in_turns_drifts',
         'test_weights_that_follow_steps_show_them_too',
+        'test_weights_follow_what_lies_between_the_rows',
         'test_kinetics_stay_with_what_is_found',
         'test_a_load_says_nothing_of_the_model_without_it',
         'test_its_level_is_that_of_an_f_test_with_a_row_for_each_block',
