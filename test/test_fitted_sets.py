@@ -59,6 +59,27 @@ def test_an_effect_in_a_rarer_form_is_less_probable_by_its_odds(fitter, sets, mo
     assert sets.log_posterior(NAMES) == pytest.approx(usual + np.log(0.1))
 
 
+@pytest.mark.parametrize('of_alloy, known, odds', [
+    (True, True, 0.2), (True, False, 1.0), (False, True, 1.0)])
+def test_what_the_bench_has_shown_of_the_alloy_is_seldom_another_on_the_arm(
+        fitter, sets, monkeypatch, of_alloy, known, odds):
+    fit = fitted(fitter)
+    sets.keep(fit)
+    usual = sets.log_posterior(NAMES)
+    monkeypatch.setattr(catalogue()['payload_error'], 'of_alloy', of_alloy)
+    if known:
+        monkeypatch.setattr(fitter.problem, 'model', fitter.problem.model.with_effects(fit.effects))
+    own = FittedSets(fitter, Settings(), np.random.default_rng(0))
+    own.keep(fit)
+    assert own.log_posterior(NAMES) == pytest.approx(usual + np.log(odds))
+
+
+def test_the_alloy_shifts_and_grows_with_the_load_and_has_its_phases():
+    """Crimps and cables of an arm stretch as they are, and muscles creep as they are used."""
+    assert {name for name, effect in catalogue().items() if effect.of_alloy} == {
+        'stress_dependence', 'stress_dependent_strain', 'r_phase'}
+
+
 def test_the_error_of_a_set_is_the_smallest_that_was_found(fitter, sets):
     """Also where a smaller one is found after it was asked for, and no larger one counts."""
     sets.keep(fitted(fitter))

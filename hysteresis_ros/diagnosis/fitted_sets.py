@@ -36,6 +36,9 @@ MUCH_MORE = 2.0
 # Of what a set explains in the rows fitted it has to explain this share in rows held out: with less
 # it fails in more of that than it predicts.
 PREDICTED = 0.5
+# Odds beforehand that what a bench has shown of the alloy is another on the arm, over those of any
+# effect.
+ANOTHER_ALLOY = 0.2
 # What of a `Fit` its judgement says.
 JUDGED = ('log_evidence', 'values', 'spread', 'judged')
 
@@ -74,6 +77,7 @@ class FittedSets:
         self.fits: dict[frozenset[str], Fit] = {}
         self.p_values: dict[str, float] = {}
         self.odds = math.log(settings.prior / (1.0 - settings.prior))
+        self._of_alloy = {effect.id for effect in self.problem.model.effects if effect.of_alloy}
         self.temper = 1.0 + len(self.problem.measured) / settings.coarsening
         # By least squares.
         self._least: dict[frozenset[str], np.ndarray] = {}
@@ -121,10 +125,12 @@ class FittedSets:
         """
         Return the logarithm of a set's posterior probability, but for a constant.
 
-        An effect whose equation contains that of another one says that both act.
+        An effect whose equation contains that of another one says that both act. What the bench has
+        shown of the alloy is seldom another on the arm.
         """
         fit = self.fits[names]
-        rarer = sum(math.log(effect.prior_odds) for effect in fit.effects)
+        rarer = sum(math.log(effect.prior_odds * (
+            ANOTHER_ALLOY if effect.id in self._of_alloy else 1.0)) for effect in fit.effects)
         return fit.log_evidence / self.temper + self.odds * self.acting(names) + rarer
 
     def acting(self, names: frozenset[str]) -> int:

@@ -256,6 +256,8 @@ class Effect(abc.ABC):
     smallest_change: ClassVar[float] = 0.0
     # Whether every muscle under load has it, so that nobody has to prove that it is there.
     universal: ClassVar[bool] = False
+    # Whether it is the alloy's, which an arm has from the same reel as the bench.
+    of_alloy: ClassVar[bool] = False
     # Whether a controller undoes it.
     invertible: ClassVar[bool] = True
     # Whether it acts before the onset of what a diagnosis tries, too: an error of the model.

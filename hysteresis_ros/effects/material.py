@@ -37,6 +37,7 @@ class StressDependence(MaterialEffect):
     experiment = 'the same loop under three or more loads'
     confused_with = ('supply_sag', 'series_compliance')
     kinds = ('arm', 'bench')
+    of_alloy = True
     universal = True
     SHIFT = Parameter('shift', '1', 'influence of the load against that in the bench model, less '
                       'one', 0.02, 1.0, 0.0, (-0.2, 0.2), both_signs=True, kinds=('arm',))
@@ -109,6 +110,7 @@ class StressDependentStrain(MaterialEffect):
     experiment = 'the same loop under three or more loads'
     confused_with = ('series_compliance',)
     kinds = ('arm', 'bench')
+    of_alloy = True
     universal = True
     limit = 'phase_modulus'
     parameters = (
@@ -236,6 +238,7 @@ class RPhase(MaterialEffect):
     experiment = 'a fine staircase of cooling steps'
     confused_with = ('slack',)
     kinds = ('arm', 'bench')
+    of_alloy = True
     parameters = (
         Parameter('strain', '% of l0', 'strain of the step', 0.05, 1.0, 0.0, (0.2, 0.5), log=True),
         Parameter('position', '1', 'drive squared q0 at the step over the largest', 0.05, 0.8, 0.3,
