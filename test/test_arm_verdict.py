@@ -3,6 +3,7 @@
 """What is said of runs of an arm: which effects could have shown, and what an unknown one is."""
 
 import dataclasses
+import math
 
 from model_support import arm_run, bicep_model, effect_of
 import numpy as np
@@ -66,6 +67,20 @@ def test_a_single_row_that_is_wrong_is_named_beside_an_effect():
                     ['payload_error', 'frame_tilt'])
     assert (told.verdict, told.explains_most) == ('unknown', ['payload_error'])
     assert told.single_row == measured.time[29] + measured.time[30]
+
+
+@pytest.mark.parametrize('row, beyond, verdict', [
+    (30, 1.5, 'missing'), (30, 3.0, 'unknown'), (31, 1.5, 'unknown')])
+def test_a_play_may_have_been_anywhere_before_a_trial(row, beyond, verdict):
+    """And nowhere further than it is wide, nor may what has no memory."""
+    model = bicep_model()
+    played = effect_of(model, 'backlash', B=8.0)
+    measured = recording(model, [played])
+    angle = measured.column('angle').copy()
+    angle[row] -= beyond * math.radians(8.0)
+    told = diagnose(model, [Measurement.from_columns({**measured.columns, 'angle': angle})],
+                    ['backlash', 'payload_error'])
+    assert told.verdict == verdict
 
 
 @pytest.fixture(scope='module')

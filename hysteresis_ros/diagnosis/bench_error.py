@@ -43,7 +43,7 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     """
     Return the root mean square error of the length [m] that the bench has shown under a load.
 
-    Under the bench's own loads it is the larger one of that on the trials fitted and that on others,
+    Under the bench's own loads it is the larger one of that on trials fitted and that on others,
     or, where there are none, on rows left out one at a time: without a row that nothing else tells
     of, a model is worse than it is. What a load shows beyond that when it is left out, it shows at
     its distance from the nearest one that stays; between and beyond the loads it counts in
@@ -71,7 +71,7 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
         return np.full(len(load), length_error(model))
     at_loads = fitted[1]
     if len(verified[0]):
-        at_loads = np.maximum(at_loads, np.interp(loads, *verified))
+        at_loads = np.maximum(at_loads, np.interp(loads, verified[0], verified[1]))
     elif len(rows[1]) == len(loads):
         at_loads = np.maximum(at_loads, rows[1])
     within = np.clip(load, loads[0], loads[-1])[:, None] - loads

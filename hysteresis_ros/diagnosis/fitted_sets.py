@@ -204,11 +204,28 @@ class FittedSets:
         known = self._sizes.get(names)
         if (known is None or known[0] is not fit.predicted or known[1] is not covariance
                 or known[2] != noise):
+            residuals = [self.problem.measured - response for response in self._responses(names)]
             sizes = covariance.equivalent_rmse(
-                [self.problem.measured - response for response in self._responses(names)], noise,
+                self._whatever_came_before(fit, residuals), noise,
                 np.random.default_rng(self._seed), self.settings.draws, ADEQUATE)
             self._sizes[names] = known = fit.predicted, covariance, noise, float(np.min(sizes))
         return known[3]
+
+    def _whatever_came_before(self, fit: Fit, residuals: list[np.ndarray]) -> list[np.ndarray]:
+        """
+        Return residuals (n,) without what effects with a memory may have done before each trial.
+
+        That was not recorded: a play, say, may have been at its other end. What they may have
+        changed in the first row of a trial is what they change in any row at most.
+        """
+        first = np.append(True, np.diff(self.problem.trial) != 0)
+        others = [effect for effect in fit.effects if not effect.memory]
+        if len(others) == len(fit.effects) or np.all(first):
+            return residuals
+        without, = self.fitter.simulate([others])
+        reach = np.max(np.abs(fit.predicted - without))
+        return [np.where(first, np.sign(residual) * np.maximum(np.abs(residual) - reach, 0.0),
+                         residual) for residual in residuals]
 
     def white_noise(self, names: frozenset[str]) -> float:
         """
