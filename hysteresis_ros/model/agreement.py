@@ -71,12 +71,12 @@ class KnownPhases:
         """Return the phase (rows,) of the run with the most similar effects, of these the last."""
         row = self._row(effects)
         own = np.flatnonzero(np.isfinite(row))
-        values, kept = row[own], self._values[:, own]
+        values, known = row[own], self._values[:, own]
         with np.errstate(invalid='ignore', divide='ignore'):
-            apart = np.nan_to_num(np.abs(kept - values) / (np.abs(kept) + np.abs(values)))
+            apart = np.nan_to_num(np.abs(known - values) / (np.abs(known) + np.abs(values)))
         # A value that only one of the two has counts 1: as many as both have, of which these are
         # the same for all runs, less twice those in common.
-        apart -= 2.0 * np.isfinite(kept)
+        apart -= 2.0 * np.isfinite(known)
         return self._phases[-1 - int(np.argmin((self._sizes + np.sum(apart, axis=1))[::-1]))]
 
     def _row(self, effects: Sequence[Effect]) -> np.ndarray:
