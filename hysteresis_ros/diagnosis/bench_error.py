@@ -43,13 +43,12 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     """
     Return the root mean square error of the length [m] that the bench has shown under a load.
 
-    Under the bench's own loads it is the larger one of that on trials fitted and that on others,
-    or, where there are none, on rows left out one at a time: without a row that nothing else tells
-    of, a model is worse than it is. What a load shows beyond that when it is left out, it shows at
-    its distance from the nearest one that stays; between and beyond the loads it counts in
-    proportion to theirs, which are half as large in the middle between two. Errors of few rows are
-    uncertain, so that those of near loads are averaged, with Gaussian weights as wide as loads are
-    apart. With fewer than three loads it is one number for all.
+    Under the bench's own loads it is the larger one of that on rows left out one at a time and on
+    trials that were not fitted. What a load shows beyond that when it is left out, it shows at its
+    distance from the nearest one that stays; between and beyond the loads it counts in proportion
+    to theirs, which are half as large in the middle between two. Errors of few rows are uncertain,
+    so that those of near loads are averaged, with Gaussian weights as wide as loads are apart. With
+    fewer than three loads it is one number for all.
 
     Parameters
     ----------
@@ -69,11 +68,9 @@ def length_errors(model: MuscleModel, load: np.ndarray) -> np.ndarray:
     loads, errors = left_out
     if len(loads) < FEWEST_LOADS or len(fitted[0]) != len(loads):
         return np.full(len(load), length_error(model))
-    at_loads = fitted[1]
+    at_loads = np.maximum(fitted[1], rows[1]) if len(rows[1]) == len(loads) else fitted[1]
     if len(verified[0]):
         at_loads = np.maximum(at_loads, np.interp(loads, verified[0], verified[1]))
-    elif len(rows[1]) == len(loads):
-        at_loads = np.maximum(at_loads, rows[1])
     within = np.clip(load, loads[0], loads[-1])[:, None] - loads
     near = np.exp(-0.5 * (within / np.median(np.diff(loads))) ** 2)
     near /= np.sum(near, axis=1, keepdims=True)
