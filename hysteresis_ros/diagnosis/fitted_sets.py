@@ -206,17 +206,17 @@ class FittedSets:
                 or known[2] != noise):
             residuals = [self.problem.measured - response for response in self._responses(names)]
             sizes = covariance.equivalent_rmse(
-                self._whatever_came_before(fit, residuals), noise,
+                self._without_unknown_past(fit, residuals), noise,
                 np.random.default_rng(self._seed), self.settings.draws, ADEQUATE)
             self._sizes[names] = known = fit.predicted, covariance, noise, float(np.min(sizes))
         return known[3]
 
-    def _whatever_came_before(self, fit: Fit, residuals: list[np.ndarray]) -> list[np.ndarray]:
+    def _without_unknown_past(self, fit: Fit, residuals: list[np.ndarray]) -> list[np.ndarray]:
         """
-        Return residuals (n,) without what effects with a memory may have done before each trial.
+        Return residuals (n,) without what a past that was not recorded may explain of them.
 
-        That was not recorded: a play, say, may have been at its other end. What they may have
-        changed in the first row of a trial is what they change in any row at most.
+        Before a trial an effect with a memory may have been in any state: a play, say, at its other
+        end. It explains of the first row of a trial as much as it changes any row, at most.
         """
         first = np.append(True, np.diff(self.problem.trial) != 0)
         others = [effect for effect in fit.effects if not effect.memory]
