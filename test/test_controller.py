@@ -92,7 +92,7 @@ def test_a_sensor_without_a_memory_needs_no_state_of_rest():
 
 
 @pytest.mark.parametrize('seat, zeroed', [
-    (-1.0, 1.0), (0.5, 1.0), (1.0, 1.0), (-1.0, 0.0), (1.0, 0.0)])
+    (-1.0, 1.0), (0.5, 1.0), (1.0, 1.0), (-1.0, 0.0), (1.0, 0.0), (-1.0, 2.0), (1.0, 2.0)])
 def test_targets_are_reached_wherever_in_its_play_the_encoder_was_zeroed(seat, zeroed):
     model = bicep_model()
     play = effect_of(model, 'backlash', B=3.0, seat=seat, zeroed=zeroed)

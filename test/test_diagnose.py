@@ -281,6 +281,22 @@ def test_a_play_is_one_wherever_in_it_the_encoder_was_zeroed(model, seat, zeroed
     assert found.effects[0].zeroed == zeroed
 
 
+@pytest.mark.long
+def test_a_play_is_one_where_a_recording_begins_in_the_middle_of_a_run(model):
+    """The muscles are hot, and where in its play the encoder lies nothing before has said."""
+    train, _ = recordings({})
+    later = {name: column[10:] for name, column in train.columns.items()}
+    played = model.with_effects([*model.effects, effect_of(
+        model, 'backlash', B=9.0, seat=1.0, zeroed=2.0)])
+    rng = np.random.default_rng(4)
+    train = Measurement.from_columns(later)
+    found = diagnose(model, [with_noise(of_the_model(played, train), math.radians(0.1)
+                                        * rng.standard_normal(train.rows))], seed=SEED)
+    assert found.missing == ['backlash']
+    assert found.effects[0].zeroed == 2.0
+    assert found.effects[0].B == pytest.approx(9.0, abs=0.3)
+
+
 @pytest.mark.parametrize('seed', range(3))
 def test_noise_that_is_slow_is_not_taken_for_an_effect(model, seed):
     """One degree that changes from row to row by little: a drift of whatever cause has no name."""

@@ -42,9 +42,14 @@ def test_backlash_stands_still_until_the_play_is_used_up():
     (0.0, 1.0, [10.0, 10.0, 11.0, 9.0]), (1.0, 1.0, [10.5, 10.5, 12.0, 10.0]),
     (-1.0, 1.0, [10.0, 9.0, 10.0, 8.0]), (0.5, 1.0, [10.0, 10.0, 11.5, 9.5]),
     (0.0, 0.0, [10.0, 10.0, 11.0, 9.0]), (1.0, 0.0, [9.5, 9.5, 11.0, 9.0]),
-    (-1.0, 0.0, [11.0, 10.0, 11.0, 9.0])])
+    (-1.0, 0.0, [11.0, 10.0, 11.0, 9.0]), (0.0, 2.0, [10.5, 10.0, 11.0, 9.0]),
+    (1.0, 2.0, [9.5, 9.5, 11.0, 9.0]), (-1.0, 2.0, [11.5, 10.0, 11.0, 9.0])])
 def test_an_encoder_may_lie_anywhere_in_its_play_at_rest(seat, zeroed, seen):
-    """Whichever way the arm came to rest, the first of its turns shows or is swallowed whole."""
+    """
+    Whichever way the arm came to rest, the first of its turns shows or is swallowed whole.
+
+    A recording that begins in the middle of a run says nothing of that.
+    """
     made = effect('backlash', B=2.0, seat=seat, zeroed=zeroed)
     made.start()
     made.begin(math.radians(10.0))

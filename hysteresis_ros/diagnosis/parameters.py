@@ -118,7 +118,7 @@ def _from_unit(parameter: Parameter, value: float) -> float:
 
 
 def starts_of(effect: Effect, kind: str, measured: np.ndarray | None = None,
-              most: int = 14, residual: np.ndarray | None = None,
+              most: int = 18, residual: np.ndarray | None = None,
               clock: np.ndarray | None = None) -> list[Effect]:
     """
     Return copies of `effect` at the values from which a fit may start.

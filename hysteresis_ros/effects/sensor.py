@@ -46,14 +46,15 @@ class Backlash(SensorEffect):
 
     Where in its play the encoder lies at the state of rest before a trial depends on how the arm
     came to rest: a muscle that has cooled down has left it at one end. It may be zeroed there, or
-    have been in the middle of its play.
+    have been in the middle of its play. Of a recording that begins in the middle of a run nothing
+    before its first row is known: the encoder lies somewhere there.
     """
 
     id = 'backlash'
     rowwise = True
     sentence = 'The encoder stands still until the play at its coupling is used up.'
-    equation = ('play operator of width B between shaft and encoder: theta_m is from '
-                'theta + (zeroed seat - 1) B / 2 to theta + (zeroed seat + 1) B / 2')
+    equation = ('play operator of width B between shaft and encoder: theta_m is from theta + '
+                '(s - 1) B / 2 to theta + (s + 1) B / 2 with s = seat where zeroed is 1, else 0')
     source = 'play operator'
     shows_in = 'reversals'
     experiment = 'move the arm by hand and watch the counts'
@@ -65,7 +66,8 @@ class Backlash(SensorEffect):
                   'middle, 1 where a turn to larger angles moves it at once, -1 one to smaller',
                   -1.0, 1.0, 0.0, (0.0, 1.0, -1.0), limits=(-1.0, 1.0), form=True),
         Parameter('zeroed', '1', '1: the encoder is zeroed at rest before a trial, 0: it was in '
-                  'the middle of its play', 0.0, 1.0, 1.0, (1.0,), choices=(1.0, 0.0)))
+                  'the middle of its play, 2: it was, and the seat is that of the first row',
+                  0.0, 2.0, 1.0, (1.0,), choices=(1.0, 0.0, 2.0)))
 
     memory = ('_state', '_target', '_lead')
 
@@ -80,8 +82,8 @@ class Backlash(SensorEffect):
         self._lead = 0.0
 
     def begin(self, rest: float) -> None:
-        """Lay the encoder where it is at rest."""
-        self._state = self._at_rest(rest)
+        """Lay the encoder where it is at rest, unless the first sample says where it is."""
+        self._state = None if self.zeroed == 2.0 else self._at_rest(rest)
 
     def _at_rest(self, rest: float) -> float:
         """Return what the encoder shows at rest [rad]."""
@@ -94,7 +96,7 @@ class Backlash(SensorEffect):
     @property
     def _middle(self) -> float:
         """What the encoder shows more than the angle in the middle of its play [rad]."""
-        return self.zeroed * self.seat * self._half
+        return self.seat * self._half if self.zeroed == 1.0 else 0.0
 
     def step(self, value: float, dt: float) -> float:
         """Move the encoder only when the play is used up."""
@@ -114,12 +116,16 @@ class Backlash(SensorEffect):
     def inverse(self, response: float) -> float:
         """Go further by half the play in the direction of the motion."""
         before = self._state if self._target is None else self._target
-        way = 0.0 if before is None else response - before
-        if way * self._lead > 0.0 or abs(way) > self.dead_band:
-            self._lead = math.copysign(self._half, way)
+        if before is None:
+            self._lead = self.seat * self._half
             self._target = response
-        elif self._target is None:
-            self._target = response
+        else:
+            way = response - before
+            if way * self._lead > 0.0 or abs(way) > self.dead_band:
+                self._lead = math.copysign(self._half, way)
+                self._target = response
+            elif self._target is None:
+                self._target = response
         # Not a turn yet: the furthest target goes on to count.
         return self._target + self._lead - self._middle
 
