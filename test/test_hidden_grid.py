@@ -103,7 +103,6 @@ def test_each_muscle_has_columns_tables_and_a_reliability(scores, tmp_path):
     assert '| score | asked | grains | cases | lagoudas | cases |' in text
     assert '| truth in the reported set, strong [%] | at least 97 | 100 | 1 | 0 | 1 |' in text
     assert '| all | >=90 | 1 | 95 | 100 |' in text and '| lagoudas | 50-70 | 1 | 60 | 0 |' in text
-    assert '| hidden (grains) |' in text and '| hidden (lagoudas) |' in text
     assert text.startswith('above') and text.endswith('below') and 'old' not in text
     assert {line.count('|') for line in text.splitlines() if line.startswith('| score')} == {7}
 
@@ -113,6 +112,18 @@ def test_each_muscle_has_columns_tables_and_a_reliability(scores, tmp_path):
     assert written['muscles']['grains']['truth in the reported set, strong [%]'] == 100.0
     assert written['reliability'] == scores.reliability(results)
     assert [row['muscle'] for row in written['reliability'][::4]] == ['all', 'grains', 'lagoudas']
+
+
+def test_each_effect_has_a_line_and_each_muscle_a_column(scores):
+    second = {**result('strong', ['slack'], []), 'missing': ['creep']}
+    text = scores.to_markdown([
+        result('strong', ['slack'], []), second, result('weak', ['slack'], [], reported=[]),
+        result('pair', ['slack', 'latency'], []),
+        *(result('weak', ['creep'], [], muscle='lagoudas', reported=names)
+          for names in ([], ['creep'], ['slack', 'creep']))])
+    assert 'weak, in the set | grains | lagoudas |' in text
+    assert '| `creep` | - | 0, 0 of 0; 2 of 3 |\n| `slack` | 1, 2 of 2; 0 of 1 | - |' in text
+    assert 'latency' not in text
 
 
 def test_twins_count_as_one(scores):
@@ -127,7 +138,8 @@ def test_outputs_without_muscle_and_probabilities_can_still_be_rendered(scores):
     old = result('weak', ['slack'], [])
     del old['sets']
     text = scores.to_markdown([old])
-    assert '| score | asked | grains | cases |' in text and '| `slack` | 0 of 0 | ' in text
+    assert '| score | asked | grains | cases |' in text
+    assert '| `slack` | 0, 0 of 0; 1 of 1 |' in text
     assert 'probability' not in text
 
 

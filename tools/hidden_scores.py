@@ -25,20 +25,25 @@ TWINS = {'supply_sag': 'airflow', 'airflow': 'supply_sag'}
 Row = dict[str, Any]
 
 
+def inside(row: Row) -> bool:
+    """Whether the one effect that is hidden is in the reported set."""
+    return not _named(row).isdisjoint(row['reported'])
+
+
+def first(row: Row) -> bool:
+    """Whether it is named first."""
+    return not _named(row).isdisjoint(row['missing'][:1])
+
+
+def _named(row: Row) -> set[str]:
+    return {row['truth'][0], TWINS.get(row['truth'][0], row['truth'][0])}
+
+
 def score(results: list[Row]) -> dict[str, tuple]:
     """Return for each score what was reached, how many cases it rests on, and what is asked."""
     def share(group, good):
         chosen = [row for row in results if row['group'] == group]
         return (100.0 * sum(map(good, chosen)) / len(chosen) if chosen else None), len(chosen)
-
-    def names(row):
-        return {row['truth'][0], TWINS.get(row['truth'][0], row['truth'][0])}
-
-    def inside(row):
-        return bool(names(row).intersection(row['reported']))
-
-    def first(row):
-        return bool(names(row).intersection(row['missing'][:1]))
 
     def both(row):
         return set(row['truth']) <= set(row['reported'])
@@ -132,9 +137,8 @@ def to_markdown(results: list[Row]) -> str:
         lines += [f'| {row["muscle"]} | {row["bin"]} | {row["cases"]} | '
                   f'{_number(row["mean probability [%]"])} | {_number(row["true [%]"])} |'
                   for row in reliability(results)]
-    for muscle, rows in by_muscle.items():
-        if any(row['group'] in SINGLE for row in rows):
-            lines += ['', *_effect_lines(muscle, rows)]
+    if any(row['group'] in SINGLE for row in results):
+        lines += ['', *_effect_lines(by_muscle)]
     return '\n'.join(lines) + '\n'
 
 
@@ -142,23 +146,25 @@ def _number(value: float | None) -> str:
     return '-' if value is None else f'{value:.3g}'
 
 
-def _effect_lines(muscle: str, results: list[Row]) -> list[str]:
-    """Return the table of the effects of one muscle."""
-    lines = [f'| hidden ({muscle}) | strong: named first | strong: in the set | weak: in the set | '
-             'unseen error over clean |', '|---|---|---|---|---|']
-    for name in sorted({row['truth'][0] for row in results if row['group'] in SINGLE}):
-        cells = []
-        for group, good in (('strong', lambda row: row['missing'][:1] == [name]),
-                            ('strong', lambda row: name in row['reported']),
-                            ('weak', lambda row: name in row['reported'])):
-            chosen = [row for row in results if row['group'] == group and row['truth'] == [name]]
-            cells.append(f'{sum(map(good, chosen))} of {len(chosen)}')
-        ratios = [row['unseen'] / row['clean'] for row in results
-                  if row['group'] in SINGLE and row['truth'] == [name] and 'unseen' in row
-                  and name in row['missing']]
-        cells.append(f'{np.median(ratios):.2f}' if ratios else '-')
-        lines.append(f'| `{name}` | ' + ' | '.join(cells) + ' |')
+def _effect_lines(by_muscle: dict[str, list[Row]]) -> list[str]:
+    """Return the table of the effects, a column for each muscle."""
+    lines = ['| hidden: strong, named first and in the set; weak, in the set | '
+             + ' | '.join(by_muscle) + ' |', '|---' * (1 + len(by_muscle)) + '|']
+    for name in sorted({row['truth'][0] for rows in by_muscle.values() for row in rows
+                        if row['group'] in SINGLE}):
+        lines.append(f'| `{name}` | ' + ' | '.join(
+            _effect_cell(name, rows) for rows in by_muscle.values()) + ' |')
     return lines
+
+
+def _effect_cell(name: str, results: list[Row]) -> str:
+    """Return how often an effect was found on one muscle; '-' where it was not hidden."""
+    strong, weak = ([row for row in results if row['group'] == group and row['truth'] == [name]]
+                    for group in SINGLE)
+    if not strong and not weak:
+        return '-'
+    return (f'{sum(map(first, strong))}, {sum(map(inside, strong))} of {len(strong)}; '
+            f'{sum(map(inside, weak))} of {len(weak)}')
 
 
 def write_page(results: list[Row], path: str | Path) -> None:
