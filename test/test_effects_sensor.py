@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects of the sensor: equations, memory, and the targets that undo them."""
 
+import itertools
 import math
 
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
+from hysteresis_ros.diagnosis.parameters import starts_of
 from hysteresis_ros.effects import catalogue, Inputs
 from hysteresis_ros.model.simulation import Simulator
 from model_support import arm_run, bicep_model, effect_of, STRENGTHS, wandering_voltage
@@ -59,6 +61,12 @@ def test_an_encoder_may_lie_anywhere_in_its_play_at_rest(seat, zeroed, seen):
     made.start()
     made.begin(math.radians(10.0))
     np.testing.assert_allclose([made.step(turn, 1.0) for turn in turns], found)
+
+
+def test_a_play_is_sought_from_either_end_and_the_middle_however_it_was_zeroed():
+    starts = starts_of(effect('backlash'), 'arm')
+    assert {(one.B, one.seat, one.zeroed) for one in starts} == set(itertools.product(
+        (1.0, 4.0), (-1.0, 0.0, 1.0), (0.0, 1.0, 2.0)))
 
 
 @given(angles, st.sampled_from([-1.0, 0.0, 1.0]))

@@ -124,6 +124,7 @@ def test_each_effect_has_a_line_and_each_muscle_a_column(scores):
     assert 'weak, in the set | grains | lagoudas |' in text
     assert '| `creep` | - | 0, 0 of 0; 2 of 3 |\n| `slack` | 1, 2 of 2; 0 of 1 | - |' in text
     assert 'latency' not in text
+    assert 'in the set |' not in scores.to_markdown([result('pair', ['slack', 'latency'], [])])
 
 
 def test_twins_count_as_one(scores):
