@@ -161,10 +161,12 @@ def _effect_cell(name: str, results: list[Row]) -> str:
     """Return how often an effect was found on one muscle; '-' where it was not hidden."""
     strong, weak = ([row for row in results if row['group'] == group and row['truth'] == [name]]
                     for group in SINGLE)
-    if not strong and not weak:
-        return '-'
-    return (f'{sum(map(first, strong))}, {sum(map(inside, strong))} of {len(strong)}; '
-            f'{sum(map(inside, weak))} of {len(weak)}')
+    cells = []
+    if strong:
+        cells.append(f'{sum(map(first, strong))}, {sum(map(inside, strong))} of {len(strong)}')
+    if weak:
+        cells.append(f'{sum(map(inside, weak))} of {len(weak)}')
+    return '; '.join(cells) or '-'
 
 
 def write_page(results: list[Row], path: str | Path) -> None:
