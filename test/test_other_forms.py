@@ -118,6 +118,7 @@ def test_creep_that_outlasts_its_hold_is_creep(monkeypatch, rested):
     assert found.effects[0].t0 == pytest.approx(90.0, rel=0.2)
 
 
+@pytest.mark.long
 def test_creep_that_a_settled_bench_contains_is_found(monkeypatch):
     """What transforms comes in part at once, and later what is left, in 1.5 to 150 s."""
     times = 1.5 * 10.0 ** np.arange(0.0, 2.5, 0.5)
