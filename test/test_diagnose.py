@@ -283,7 +283,7 @@ def test_a_play_is_one_wherever_in_it_the_encoder_was_zeroed(model, seat, zeroed
 
 
 @pytest.mark.long
-def test_a_play_is_one_where_a_recording_begins_in_the_middle_of_a_run(model):
+def test_backlash_is_found_where_a_recording_begins_hot(model):
     """The muscles are hot, and where in its play the encoder lies nothing before has said."""
     train, _ = recordings({})
     later = {name: column[10:] for name, column in train.columns.items()}

@@ -63,7 +63,7 @@ def test_an_encoder_may_lie_anywhere_in_its_play_at_rest(seat, zeroed, seen):
     np.testing.assert_allclose([made.step(turn, 1.0) for turn in turns], found)
 
 
-def test_a_play_is_sought_from_either_end_and_the_middle_however_it_was_zeroed():
+def test_backlash_starts_from_every_seat_however_it_was_zeroed():
     starts = starts_of(effect('backlash'), 'arm')
     assert {(one.B, one.seat, one.zeroed) for one in starts} == set(itertools.product(
         (1.0, 4.0), (-1.0, 0.0, 1.0), (0.0, 1.0, 2.0)))

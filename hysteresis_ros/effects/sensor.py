@@ -62,11 +62,11 @@ class Backlash(SensorEffect):
     kinds = ('arm',)
     parameters = (
         Parameter('B', 'deg', 'width of the play', 0.2, 12.0, 0.0, (1.0, 4.0), log=True),
-        Parameter('seat', '1', 'where in its play the encoder rests before a trial: 0 in the '
+        Parameter('seat', '1', 'where in its play the encoder lies before a trial: 0 in the '
                   'middle, 1 where a turn to larger angles moves it at once, -1 one to smaller',
                   -1.0, 1.0, 0.0, (0.0, 1.0, -1.0), limits=(-1.0, 1.0), form=True),
         Parameter('zeroed', '1', '1: the encoder is zeroed at rest before a trial, 0: it was in '
-                  'the middle of its play, 2: it was, and the seat is that of the first row',
+                  'the middle of its play, 2: as 0, with the seat of the first row of a trial',
                   0.0, 2.0, 1.0, (1.0,), choices=(1.0, 0.0, 2.0)))
 
     memory = ('_state', '_target', '_lead')
@@ -116,16 +116,14 @@ class Backlash(SensorEffect):
     def inverse(self, response: float) -> float:
         """Go further by half the play in the direction of the motion."""
         before = self._state if self._target is None else self._target
+        moved = before is None or (response - before) * self._lead > 0.0 or (
+            abs(response - before) > self.dead_band)
         if before is None:
             self._lead = self.seat * self._half
+        elif moved:
+            self._lead = math.copysign(self._half, response - before)
+        if moved or self._target is None:
             self._target = response
-        else:
-            way = response - before
-            if way * self._lead > 0.0 or abs(way) > self.dead_band:
-                self._lead = math.copysign(self._half, way)
-                self._target = response
-            elif self._target is None:
-                self._target = response
         # Not a turn yet: the furthest target goes on to count.
         return self._target + self._lead - self._middle
 
